@@ -7,8 +7,8 @@ __version__: str
 
 
 def __getattr__(name: str) -> str:
-    """``__version__`` as package.xml has it: that of the source tree, else what was installed. Found when asked for: the
-    lookup takes a fifth of the time of a short command.
+    """``__version__``, from package.xml of the source tree, else from the installed metadata. Looked up when asked for:
+    that takes a fifth of the time of a short command.
     """
     if name != "__version__":
         raise AttributeError(f"module {__name__!r} has no attribute {name!r}")

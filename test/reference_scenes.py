@@ -22,6 +22,7 @@ from rigid_proto_ros.motion.loads import (
     BODY_FORCE,
     BODY_TORQUE,
     NO_GYROSCOPIC_TERM,
+    ROTOR,
     STRING,
     WORLD_TORQUE,
 )
@@ -100,6 +101,8 @@ class Scene:
             angular_damping=float(setup.scene.angular_damping),
             gyroscopic=bool(setup.scene.gyroscopic),
             string=self._string(time_s),
+            rotor=tuple(setup.scene.rotor_momentum + time_s * setup.scene.rotor_torque),
+            rotor_torque=tuple(setup.scene.rotor_torque),
             **loads,
         )
 
@@ -156,6 +159,8 @@ def scene_with(needs, string: StringSettings | None = None) -> Scene:
         linear_damping=0.3,
         angular_damping=0.2 if ANGULAR_DAMPING in needs else 0.0,
         gyroscopic=NO_GYROSCOPIC_TERM not in needs,
+        rotor_momentum=(0.3, -0.5, 0.2) if ROTOR in needs else ZERO,
+        rotor_torque=(-0.1, 0.2, 0.3) if ROTOR in needs else ZERO,
         string=string or StringSettings(),
     )
     turns = WORLD_TORQUE in needs
@@ -246,6 +251,11 @@ def make_scene(features: dict, rng: np.random.Generator) -> Scene:
         torques = [body.principal_moments.min() * log_uniform(rng, 0.3, 10.0) * direction(rng) for _ in range(2)]
         points = reach * rng.normal(size=(2, 3))
         loads = tuple(zip(("world", "body"), points, forces, torques, strict=True))
+    rotor = {}
+    if f.get("rotor", "none") != "none":
+        least = body.principal_moments.min()
+        rotor["rotor_momentum"] = least * log_uniform(rng, 0.1, 30.0) * direction(rng)
+        rotor["rotor_torque"] = least * log_uniform(rng, 0.1, 30.0) * direction(rng) * (f["rotor"] == "driven")
     setup = flight_setup(
         body,
         integrator="auto",
@@ -255,6 +265,7 @@ def make_scene(features: dict, rng: np.random.Generator) -> Scene:
         angular_damping=body.principal_moments.min() * log_uniform(rng, 0.01, 3.0) if f["angular_damping"] else 0.0,
         string=string,
         size=size,
+        **rotor,
     )
     return Scene(setup, loads, LOAD_S, moved)
 

@@ -34,7 +34,9 @@ class ReferenceString:
 
 @dataclass(frozen=True)
 class ReferenceProblem:
-    """A body and constant loads. moment = Σ r Fᵀ of world forces F at body points r; damping [N s/m] and [N m s]."""
+    """A body and constant loads. moment = Σ r Fᵀ of world forces F at body points r; damping [N s/m] and [N m s]. A flywheel
+    has the momentum rotor + t rotor_torque, body axes.
+    """
 
     mass: float
     inertia: tuple
@@ -48,6 +50,8 @@ class ReferenceProblem:
     angular_damping: float = 0.0
     gyroscopic: bool = True
     string: ReferenceString | None = None
+    rotor: tuple = ZERO
+    rotor_torque: tuple = ZERO
 
 
 def reference_motion(problem: ReferenceProblem, row, times, digits: int = 40) -> list[list]:
@@ -214,14 +218,17 @@ class _Motion:
         added_force, torque_body = numbers(p.force_world), numbers(p.torque_body)
         mass, gravity = numbers(p.mass), numbers(p.gravity)
         linear, angular = numbers(p.linear_damping), numbers(p.angular_damping)
+        rotor, rotor_torque = numbers(p.rotor), numbers(p.rotor_torque)
         string = _StringSeries(p.string, row, R, now, numbers) if p.string else None
         for k in range(order):
             L[:, k] = self.inertia @ w[:, k]
+            if k < 2:
+                L[:, k] = L[:, k] + (rotor + now * rotor_torque if k == 0 else rotor_torque)
             R[:, :, k] = turn = _rotation(_product(q, q, k))
             force = turn @ force_body
             torque = turn.T @ torque_world + _crossed(moment @ turn)
             if k == 0:
-                force, torque = force + added_force + mass * gravity, torque + torque_body
+                force, torque = force + added_force + mass * gravity, torque + torque_body - rotor_torque
             if string is not None:
                 pull, twist = string.append(k, taut)
                 force, torque = force + pull, torque + twist

@@ -13,7 +13,7 @@ export interface Words {
   readonly walls: string;
   readonly orientation: string;
   readonly rate: readonly string[];
-  readonly magnitude: string;
+  readonly magnitude: readonly string[];
   readonly pull: string;
   readonly freeEnd: string;
   readonly integrator: string;

@@ -67,6 +67,17 @@ const besideGhost = (a: Account, name: keyof typeof NAMED): readonly Seen[] => {
   return unturned(present(a), a.scene) && hasTerm(seen) && isSameGhost(a.sight.ghost, NAMED[name].choice) && seen.every(({ now }) => now.ghost !== null) ? seen : [];
 };
 
+/** [N m s] of the flywheel, and [rad/s] of the body, both in its axes. */
+const wheel = ({ now: { body } }: Seen): Vec3 => body.rotor;
+const own = ({ now: { body } }: Seen): Vec3 => body.row.slice(10, 13) as unknown as Vec3;
+
+/** The whole trial at the lesson's spin with this momentum of the wheel along y, and no motor. */
+function withWheel(a: Account, h: number): readonly Seen[] {
+  const seen = whole(a);
+  return unturned(present(a), a.scene) && hasTerm(seen) && seen.every((each) => isVector(wheel(each), [0, h, 0])) ? seen : [];
+}
+const spinUp = (h: number): Act => start((w) => w.wheel(String(h)), (scene) => ({ "initial.angular_velocity": startSpin(scene), "rotor.momentum": [0, h, 0], "rotor.torque": [0, 0, 0] }));
+
 const hasTerm = (seen: readonly Seen[]): boolean => seen.every(({ values }) => values["gyroscopic"] !== false);
 const model = ({ values }: Seen): string => String(values["inertia_model"]);
 
@@ -138,6 +149,25 @@ export const LESSON_PLANS: Readonly<Record<string, LessonPlan>> = {
       {
         done: (a) => { const seen = besideGhost(a, "mujoco"), { body, ghost } = seen[seen.length - 1]?.now ?? {}; return body !== undefined && Boolean(ghost) && ghost!.kinetic > 1.1 * body.kinetic; },
         acts: [ghost("mujoco"), { kind: "card", card: "plots", mark: "energy", text: (w) => w.energies }, { kind: "card", card: "ghost", mark: "mujoco", text: (w) => w.card }],
+      },
+    ],
+  },
+  flywheel: {
+    plots: ["omega", "momentum"],
+    steps: [
+      watch((a) => { const seen = free(a); return unturned(present(a), a.scene) && seen.every((each) => size(wheel(each)) === 0) && flips(seen, 1) > 1; }),
+      {
+        done: (a) => { const seen = withWheel(a, 0.01); return lasted(seen) > 7 && steady(seen, 1); },
+        acts: [spinUp(0.01), { kind: "card", card: "world", mark: "flywheel", text: (w) => w.card }],
+      },
+      { done: (a) => withWheel(a, 0.003).some((each) => between(axis(each, 1), momentum(each)) > 60), acts: [spinUp(0.003)] },
+      {
+        done: (a) => {
+          const seen = whole(a), last = seen[seen.length - 1], { start: from } = present(a);
+          return last !== undefined && size(startSpin(from)) === 0 && size(from["rotor.momentum"] as readonly number[]) === 0 && lasted(seen) > 1.5
+            && size(wheel(last)) > 1e-3 && size(momentum(last)) < 1e-6 * size(wheel(last)) && between(wheel(last), own(last)) > 179;
+        },
+        acts: [start((w) => w.motor, () => ({ "initial.angular_velocity": [0, 0, 0], "rotor.momentum": [0, 0, 0], "rotor.torque": [0, 0.002, 0] }))],
       },
     ],
   },

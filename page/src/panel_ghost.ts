@@ -4,6 +4,7 @@ import { MEASURED, type Measured } from "./engines.ts";
 import { isSameGhost, NAMED, NO_GHOST } from "./ghosts.ts";
 import type { Card, Desk } from "./panel.ts";
 import { check, choice, make } from "./panel_elements.ts";
+import { hasFlywheel } from "./poinsot.ts";
 import type { GhostChoice } from "./source.ts";
 import { words } from "./words.ts";
 import { short } from "./words_numbers.ts";
@@ -39,7 +40,8 @@ export function ghostCard(desk: Desk): Card {
   const apart = check(w.apart, look.apart, (on) => { look.apart = on; desk.picture.setApart(on); });
   const source = make("p", { class: "note" }), rows = make("tbody"), date = make("p", { class: "note" });
   const table = make("table", {}, make("thead", {}, make("tr", {}, ...w.heads.map((head) => make("th", {}, head)))), rows);
-  const measured = make("div", {}, source, make("p", { class: "note" }, w.measured), table, date);
+  const noFlywheel = make("p", { class: "note" }, w.noFlywheel);
+  const measured = make("div", {}, source, noFlywheel, make("p", { class: "note" }, w.measured), table, date);
   let told: string | null = null;
   const changed = (): void => {
     const now = motion.ghost(), kind = kindOf(now);
@@ -49,6 +51,7 @@ export function ghostCard(desk: Desk): Card {
     step.show(String(now.step));
     apart.node.hidden = kind === "";
     measured.hidden = !(kind in w.sources);
+    noFlywheel.hidden = !hasFlywheel(motion);
     if (kind === told) return;
     told = kind;
     const found = kind === "gyroscopic" || kind === "mujoco" ? MEASURED.filter(({ ghost, stepS }) => ghost === NAMED[kind].beside && stepS > FINE) : [];

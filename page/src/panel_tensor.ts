@@ -2,6 +2,7 @@
 
 import type { Card, Desk } from "./panel.ts";
 import { button, check, make } from "./panel_elements.ts";
+import { hasFlywheel } from "./poinsot.ts";
 import { words } from "./words.ts";
 import { short } from "./words_numbers.ts";
 
@@ -53,12 +54,13 @@ export function tensorCard(desk: Desk): Card {
     shapes.push(() => show(look[name]));
     return row;
   };
+  const rolls = make("p", { class: "note" });
   const node = make("div", {}, make("p", { class: "note" }, w.about), matrix, said, make("div", { class: "sliders", "data-mark": "turn" }, ...turns.map(({ node: row }) => row)),
     make("div", { class: "row" }, button(w.principal, begin([])), button(w.mesh, begin(UNTURNED))),
     make("h3", {}, w.shapes), shape(w.box, "inertiaBox"), shape(w.ellipsoid, "ellipsoid"), shape(w.axes, "principal"), shape(w.bounding, "boundingBox"),
-    make("h3", {}, w.poinsot), shape(w.rolls, "poinsot"), shape(w.cones, "cones"), make("p", { class: "note" }, w.poinsotNote));
+    make("h3", {}, w.poinsot), shape(w.rolls, "poinsot"), shape(w.cones, "cones"), rolls);
   return {
-    node, changed: () => { draw(); for (const each of shapes) each(); },
+    node, changed: () => { draw(); for (const each of shapes) each(); rolls.textContent = hasFlywheel(motion) ? w.poinsotFlywheel : w.poinsotNote; },
     closed: () => { look.turned = null; },
   };
 }

@@ -4,7 +4,7 @@
 // the plane L . omega = 2 T. The path of the contact point on the ellipsoid is the polhode, its path on the plane the
 // herpolhode. Rays from the centre through them form the body cone and the space cone; the first rolls on the second.
 
-import type { BodyInfo, Flying, Snapshot, Vec3 } from "./source.ts";
+import type { BodyInfo, Flying, Motion, Snapshot, Vec3 } from "./source.ts";
 
 /** Relative change of L beyond which a new herpolhode starts. */
 const SAME = 2e-3;
@@ -27,10 +27,14 @@ export interface Construction {
 
 const dot = (a: Vec3, b: Vec3): number => a[0] * b[0] + a[1] * b[1] + a[2] * b[2];
 
-/** The construction for a body at one instant, scaled to its size [m]; null if the body doesn't spin. */
-export function construction({ row, omega, momentum }: Flying, { moments, axes }: BodyInfo, size: number): Construction | null {
+/** Whether a flywheel turns in the body, or is driven. */
+export const hasFlywheel = (motion: Motion): boolean =>
+  [...motion.snapshot().body.rotor, ...(motion.values()["rotor.torque"] as readonly number[])].some((x) => x !== 0);
+
+/** The construction for a body at one instant, scaled to its size [m]; null if the body doesn't spin or has a flywheel. */
+export function construction({ row, omega, momentum, rotor }: Flying, { moments, axes }: BodyInfo, size: number): Construction | null {
   const twice = dot(omega, momentum), l = Math.hypot(...momentum), [I1, I2] = moments;
-  if (!(twice > 0 && l > 0 && I1 > 0)) return null;
+  if (!(twice > 0 && l > 0 && I1 > 0) || rotor.some((h) => h !== 0)) return null;
   const w = [0, 1, 2].map((k) => axes[k]! * row[10]! + axes[3 + k]! * row[11]! + axes[6 + k]! * row[12]!) as unknown as Vec3;
   const mean = Math.sqrt(I1 * I2), longest = MEAN * Math.sqrt(mean / I1), scale = size * (longest > LONGEST ? LONGEST / longest : 1) * MEAN;
   const unit = scale * Math.sqrt(mean / twice);

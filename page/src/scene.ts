@@ -85,7 +85,7 @@ export class Refusals {
       case refusal.RATE:
         return filled(words.rate[detail] ?? "", { 0: a, 1: b, 2: c });
       case refusal.MAGNITUDE:
-        return filled(words.magnitude, { 0: a, 1: b, 2: c });
+        return filled(words.magnitude[detail] ?? "", { 0: a, 1: b, 2: c });
       case refusal.PULL:
         return filled(words.pull, { 0: a, 1: b, 2: c });
       case refusal.AT_FREE_END:

@@ -147,6 +147,8 @@ export interface Flying {
   readonly omega: Vec3;
   /** L about the centre of mass [N m s, world] */
   readonly momentum: Vec3;
+  /** h of the flywheel [N m s, body axes] */
+  readonly rotor: Vec3;
   /** [J]; potential: of gravity and string */
   readonly kinetic: number;
   readonly potential: number;

@@ -82,7 +82,7 @@ export class Observed {
     const kernels = this.#kernels, memory = kernels.memory, { quantity, body } = NUMBERS;
     const { flight, scene } = flown, row = [...flight.row], own = flight.body;
     kernels.stateOf(scene, flight, this.#state);
-    const inertia: Vector = { at: this.#state.at + 8 * quantity.INERTIA, n: 9 };
+    const inertia: Vector = { at: this.#state.at + 8 * quantity.INERTIA, n: 9 }, rotor: Vector = { at: this.#state.at + 8 * quantity.ROTOR, n: 3 };
     const rotation = this.rotation(row.slice(3, 7));
     const place: BodyPlace = { rotation, position: triple(row), com: triple(own, body.COM), scale: triple(own, body.BODY_SCALE) };
     memory.f8(this.#context.at, this.#context.n).fill(0);
@@ -90,7 +90,8 @@ export class Observed {
       row,
       rotation,
       omega: times(rotation, triple(row, 10)),
-      momentum: kernels.angularMomentum(this.#state, inertia),
+      momentum: kernels.angularMomentum(this.#state, inertia, rotor),
+      rotor: triple(memory.f8(rotor.at, 3)),
       kinetic: kernels.quantity(quantity.KINETIC, this.#state, this.#context),
       potential: kernels.quantity(quantity.POTENTIAL, this.#state, this.#context),
       handWork: flight.workBefore + flight.work,

@@ -63,6 +63,7 @@ export const english = {
   world: {
     name: "World", gravity: "Gravity", down: "downwards", places: [["none", 0], ["Moon", 1.62], ["Mars", 3.71], ["Earth", 9.81]] as const,
     damping: "Damping", linear: "of speed", angular: "of spin", start: "Spin at the start", startNote: "Acts when you start again.",
+    flywheel: "Flywheel", wheel: "momentum", motor: "motor", flywheelNote: "In axes of the body. A motor spins wheel and body up against each other; L is that of both.",
     motion: "Law of motion", gyroscopic: "gyroscopic term ω × Iω", integrator: "integrator", step: "step",
   },
   ghost: {
@@ -74,6 +75,7 @@ export const english = {
       gyroscopic: "By default these engines keep ω where the law of motion keeps L: they leave ω × Iω out. Jolt and PhysX have a switch for it.",
       mujoco: "MuJoCo's default, Euler's method, takes new velocities from the old ones, then moves with the new: semi_implicit_euler here.",
     } as Record<string, string>,
+    noFlywheel: "A body of these engines has no flywheel; the ghost has that of the body.",
     measured: "Measured: 60 s about the middle axis, in which the true motion flips 9 times and keeps its energy", heads: ["at 1/60 s", "flips", "energy"],
     measuredNote: (date: string) => `${date}; other engines, steps and versions: docs/benchmarks.md, Physics engines.`, kept: "kept", notFlown: "not flown",
   },
@@ -83,6 +85,7 @@ export const english = {
     none: "The products vanish: these are principal axes.", shapes: "In the picture", box: "inertia box", ellipsoid: "inertia ellipsoid",
     axes: "axes I₁ I₂ I₃", bounding: "bounding box", poinsot: "Poinsot's construction", rolls: "ellipsoid that rolls on a plane", cones: "cones of body and space",
     poinsotNote: "The plane stands across L, and ω ends where the ellipsoid touches it. Without pulls and pokes the plane stays, and the ellipsoid rolls on it.",
+    poinsotFlywheel: "With a flywheel ω doesn't end on that plane: nothing is drawn.",
   },
   measure: {
     name: "Measure", protractor: "Protractor", between: "between", and: "and", off: "off",
@@ -113,7 +116,7 @@ export const english = {
     pressHow: "Press a place of the body, or aim with arrow keys and press Enter", throwAbout: (axis: string) => `throw it about ${axis}`, withoutTerm: "term off, and start again",
     termOn: "switch the term on", termOff: "switch the term off", box: "bounding box", truth: "true tensor", corners: "mass in the corners", stick: "stick on 30 g, and start again", unstick: "take it off",
     ballast: "open ballast", card: "open the card", ghosts: { gyroscopic: "ghost as in Jolt, and start again", mujoco: "ghost as in MuJoCo, and start again" }, energies: "plot the energies", poinsot: "show the ellipsoid", principal: "show the axes", turn: "open the axes", aboutThird: "spin about I₃", chalk: "draw the line", tie: "tie it here", tieHow: "Press the place to tie it, or aim with arrow keys and press Enter",
-    twice: "spin × 2", half: "spin × ½", noSpin: "no spin", trace: "trace the grip", weightless: "gravity off", moments: "open the table", tenfold: "mass × 10", tenth: "mass as before",
+    twice: "spin × 2", half: "spin × ½", noSpin: "no spin", trace: "trace the grip", weightless: "gravity off", moments: "open the table", wheel: (h: string) => `wheel: ${h} N m s, and start again`, motor: "at rest, with a motor", tenfold: "mass × 10", tenth: "mass as before",
   },
   percent: (part: number) => (Number.isFinite(part) ? `${part < 0 ? "−" : "+"}${short(Math.abs(part), 2)} %` : "–"),
 };

@@ -180,6 +180,14 @@ export const WRONG: Readonly<Record<string, readonly (readonly Hand[])[]>> = {
       (player) => { player.ghost(NAMED.gyroscopic.choice); player.start({ "initial.angular_velocity": [12, 0, 0] }); player.fly(8); }],
     [still, pokes, beside(NAMED.gyroscopic.choice), beside({ ...NO_GHOST, integrator: "semi_implicit_euler" }), beside({ ...NO_GHOST, integrator: "rk4", step: 0.016666667 })],
   ],
+  flywheel: [
+    [stand, pokes, spin(0.05, 0.05, 6), values({ "rotor.momentum": [0, 0.01, 0] }, 8)],
+    [still, pokes, values({ "rotor.momentum": [0, 0.01, 0] }, 10), anew({ "rotor.momentum": [0, 0.003, 0] }, wait(9)), anew({ "rotor.momentum": [0.01, 0, 0] }, wait(9)), anew({ "rotor.momentum": [0, -0.01, 0] }, wait(9)), anew({ "rotor.momentum": [0, 0.01, 0], gyroscopic: false }, wait(9)),
+      anew({ "rotor.momentum": [0, 0.01, 0], "initial.angular_velocity": [0, 0, 6] }, wait(9)), anew({ "rotor.torque": [0, 0.002, 0] }, wait(9))],
+    [still, pokes, anew({ "rotor.momentum": [0, 0, 0] }, wait(9)), anew({ "rotor.momentum": [0, 0.01, 0] }, wait(9)), anew({ "rotor.momentum": [0, 0.003, 0], "initial.angular_velocity": [0, 0, 6] }, wait(9)), (player) => { player.set({ "rotor.momentum": [0, 0.003, 0] }); player.fly(6); }],
+    [still, pokes, spin(0, 0, 0), anew({ "rotor.torque": [0, 0.002, 0] }), anew({ "rotor.torque": [0, 0.002, 0], "initial.angular_velocity": [0, 0, 0], "rotor.momentum": [0, 0.003, 0] }),
+      (player) => { player.start({ "rotor.torque": [0, 0, 0], "initial.angular_velocity": [0, 0, 0], "rotor.momentum": [0, 0, 0] }); player.poke("corner", [0, 0, 1]); player.fly(3); }],
+  ],
   hammer: [
     [stand, pokes, values({ inertia_model: "bounding_box" })], [still, pokes, values({ inertia_model: "shell" })],
     [still, pokes, (player) => { player.set({ inertia_model: "solid" }); player.poke("head", [1, 0, 0]); player.fly(0.5); player.poke("grip", [1, 0, 0], 2); player.fly(1); },

@@ -130,6 +130,7 @@ class Hand {
       { gravity: this.pick([0, 0, 0], [0, 0, -9.81], [0, 0, -1.62]) },
       { linear_damping: this.pick(0, 0.3 * massKg), angular_damping: this.pick(0, 1e-4) },
       { gyroscopic: this.chance(0.5) },
+      { "rotor.momentum": this.chance(0.3) ? [0, 0, 0] : this.vector(0.01 * massKg), "rotor.torque": this.chance(0.5) ? [0, 0, 0] : this.vector(0.01 * massKg) },
       { integrator, step: this.pick(0.001, 0.0005, 0.004) },
       { accuracy: this.pick(1e-9, 1e-7, 1e-12) },
       { "string.frequency": this.number(4, 12), "string.damping_ratio": this.number(0, 1) },

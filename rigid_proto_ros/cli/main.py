@@ -37,9 +37,10 @@ EXAMPLES = (
 
 
 class ShowVersion(argparse.Action):
-    """Print the package's version, which is looked up only then."""
+    """Option that prints the package's version, which is looked up only then."""
 
     def __call__(self, parser: argparse.ArgumentParser, *_: object) -> None:
+        """Print it and exit."""
         from .. import __version__
 
         print(__version__)

@@ -30,6 +30,8 @@ def session_flight(
         raise InputError(
             "session", f"{name} has a string tied to the body from its start; only wrenches and pokes are supported"
         )
+    if setup.flight.has_rotor:
+        raise InputError("session", f"{name} has a flywheel; only gravity and damping act beside wrenches and pokes")
     if not setup.scene.gyroscopic:
         raise InputError(
             "session", f"{name} was simulated with gyroscopic: false, which isn't the motion of a rigid body"

@@ -145,7 +145,7 @@ _NUMBERS: dict[str, tuple[Any, str]] = {
     ),
     "body": (of_body, "MASS COM INERTIA MOMENTS AXES QUATERNION BODY_SCALE LENGTH BODY"),
     "string": (of_string, "KNOT ORIGIN TARGET REST PUSHES"),
-    "quantity": (quantities, "KINETIC POTENTIAL INERTIA STATE CONTEXT"),
+    "quantity": (quantities, "KINETIC POTENTIAL INERTIA ROTOR STATE CONTEXT"),
     "moments": (of_mesh, "FOUND ROOM"),
     "tensor": (of_tensor, "NEARLY"),
     "scene": (record, "MAX_BALLASTS"),

@@ -6,6 +6,7 @@ Compiled kernels read a body as a row of BODY doubles.
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
@@ -15,7 +16,7 @@ from numpy.typing import NDArray
 
 from ..base.compilation import exported, njit
 from ..base.rotation import norm, quaternion_of_axes
-from ..base.vectors import Attitude, Matrix3, Numbers, Vector3
+from ..base.vectors import Attitude, Matrix3, Numbers, Vector, Vector3
 from ..mass.tensor import principal_axes
 
 # Layout of a body's row.
@@ -50,6 +51,18 @@ def angular_acceleration(body: BodyRow, x: float, y: float, z: float) -> tuple[f
         body[P + 3] * a + body[P + 4] * b + body[P + 5] * c,
         body[P + 6] * a + body[P + 7] * b + body[P + 8] * c,
     )
+
+
+@njit(error_model="numpy", allocates=False)
+def rotor_rate(body: BodyRow, h: Vector) -> float:
+    """Angular frequency [rad/s] at which a slow body turns about a flywheel of momentum h [N m s, body axes]: the
+    eigenvalue √(hᵀI h/det I) of I ω' = h × ω.
+    """
+    P, A, B, C = AXES, math.sqrt(body[MOMENTS]), math.sqrt(body[MOMENTS + 1]), math.sqrt(body[MOMENTS + 2])
+    a = body[P] * h[0] + body[P + 3] * h[1] + body[P + 6] * h[2]
+    b = body[P + 1] * h[0] + body[P + 4] * h[1] + body[P + 7] * h[2]
+    c = body[P + 2] * h[0] + body[P + 5] * h[1] + body[P + 8] * h[2]
+    return norm(a / (B * C), b / (A * C), c / (A * B))
 
 
 @njit(error_model="numpy", allocates=False)

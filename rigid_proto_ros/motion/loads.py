@@ -55,11 +55,18 @@ BODY_FORCE = "a force that turns with the body"
 ANGULAR_DAMPING = "angular damping"
 STRING = "a string"
 NO_GYROSCOPIC_TERM = "gyroscopic: false"
-NEEDS = (BODY_TORQUE, WORLD_TORQUE, BODY_FORCE, ANGULAR_DAMPING, STRING, NO_GYROSCOPIC_TERM)
+ROTOR = "a flywheel"
+NEEDS = (BODY_TORQUE, WORLD_TORQUE, BODY_FORCE, ANGULAR_DAMPING, STRING, NO_GYROSCOPIC_TERM, ROTOR)
 """What a scene may need of its integrator; compiled functions have bits for it, in this order."""
-NEED_BODY_TORQUE, NEED_WORLD_TORQUE, NEED_BODY_FORCE, NEED_ANGULAR_DAMPING, NEED_STRING, NEED_NO_GYROSCOPIC_TERM = (
-    1 << k for k in range(6)
-)
+(
+    NEED_BODY_TORQUE,
+    NEED_WORLD_TORQUE,
+    NEED_BODY_FORCE,
+    NEED_ANGULAR_DAMPING,
+    NEED_STRING,
+    NEED_NO_GYROSCOPIC_TERM,
+    NEED_ROTOR,
+) = (1 << k for k in range(len(NEEDS)))
 
 RESOLVED, NO_MESH, NO_VERTEX, NO_MESH_NORMAL, NO_NORMAL, MISSED = range(6)
 """Whether a load's point was found, or why not."""

@@ -4,11 +4,12 @@
 Within a segment all commands are constant. Everything is in principal axes (the body's, turned so that the tensor is
 diagonal): I₁ ≤ I₂ ≤ I₃, torques τ and arms r. The motion is
 
-    I ω' = τ_b + Rᵀ τ_w + vee(M R) + r × RᵀF − c_ω ω − ω × I ω,    q' = ½ q ⊗ ω,
+    I ω' = τ_b + Rᵀ τ_w + vee(M R) + r × RᵀF − c_ω ω − ω × (I ω + h) − h',    q' = ½ q ⊗ ω,
     x' = v,    v' = g_w + R g_b + F/m − c_v v
 
 with g_w = gravity + F_w/m [m/s², world], g_b = F_b/m [m/s², principal], M = Σ r F_wᵀ (r principal, F world), c_v = c/m
-and F the pull of the string (motion/string.py) on its knot at r.
+and F the pull of the string (motion/string.py) on its knot at r. h is the momentum of a flywheel relative to the body,
+which within a segment grows evenly: h = h₀ + t h'.
 
 Translation is split into a reference that has a closed form and what is added to it, so that an integrator computes no
 more than it must, and the reference has no error to accumulate: under a constant acceleration g and damping c, x = x₀ +
@@ -17,8 +18,8 @@ body-fixed force adds obeys u' = R g_b − c u whatever the reference does. With
 c_v do from the start on, with one it is the even motion of the string's free end.
 
 The variables y of a segment: attitude q xyzw of the principal axes (principal to world), ω in principal axes, the added
-displacement and velocity, and what the hand has worked and the string's damper has heated since the segment's start
-[J].
+displacement and velocity, what the hand has worked and the string's damper has heated since the segment's start [J],
+and the time since then, which only the flywheel asks for.
 """
 
 from __future__ import annotations
@@ -67,6 +68,9 @@ PROBLEM = record_type(
         ("attach", np.float64, 3),  # r of the knot [m, principal]
         ("string_start", np.float64, 3),  # COM minus free end at the segment's start [m, world]
         ("hand_velocity", np.float64, 3),  # of the free end [m/s, world]
+        ("has_rotor", np.bool_),  # when there is a flywheel
+        ("rotor", np.float64, 3),  # h at the segment's start [N m s]
+        ("rotor_torque", np.float64, 3),  # h' [N m]
     ]
 )
 
@@ -149,6 +153,16 @@ def begin_string(
     p.bilateral = string[PUSHES] != 0.0 or string[REST] == 0.0
 
 
+@njit(error_model="numpy", allocates=False)
+def begin_rotor(p: np.record, h: Vector, torque: Vector) -> None:
+    """Complete the problem p with a flywheel: its momentum h at the segment's start and its rate, in body axes."""
+    P = p.principal_axes
+    for k in range(3):
+        p.rotor[k] = P[k] * h[0] + P[3 + k] * h[1] + P[6 + k] * h[2]
+        p.rotor_torque[k] = P[k] * torque[0] + P[3 + k] * torque[1] + P[6 + k] * torque[2]
+    p.has_rotor = True
+
+
 # What acts beside the string, as the equations of motion take it. q xyzw takes principal to world axes, w = ω is in
 # principal axes, u is the added velocity in world axes.
 
@@ -202,7 +216,8 @@ DISPLACEMENT = 7  # (3,)
 VELOCITY = 10  # (3,)
 HAND_WORK = 13
 HEAT = 14
-VARIABLES = 15
+TIME = 15
+VARIABLES = 16
 
 MAX_SPEED = 1e100
 """|x|, |v| or |ω| beyond this is a runaway: squares of it still fit a double, and nothing physical is near."""
@@ -235,7 +250,7 @@ def damping_functions(z: float) -> tuple[float, float]:
 
 @njit(error_model="numpy", allocates=False)
 def to_variables(row: StateRow, p: np.record, y: Variables) -> None:
-    """State row (13,) to variables y (≥ 15,) at the start of the segment with problem p."""
+    """State row (13,) to variables y (VARIABLES,) at the start of the segment with problem p."""
     P, Q = p.principal_axes, p.principal_quaternion
     y[0], y[1], y[2], y[3] = multiply(row[3], row[4], row[5], row[6], Q[0], Q[1], Q[2], Q[3])
     for k in range(3):
@@ -244,11 +259,21 @@ def to_variables(row: StateRow, p: np.record, y: Variables) -> None:
         y[VELOCITY + k] = p.start_velocity_added[k]
     y[HAND_WORK] = 0.0
     y[HEAT] = 0.0
+    y[TIME] = 0.0
+
+
+_TO_NEAREST = 6755399441055744.0  # 1.5·2⁵²
+
+
+@njit(error_model="numpy", allocates=False)
+def later(time: float, h: float) -> float:
+    """time + h [s], whole nanoseconds each, ≥ 0: rounded to these, so that no error adds up over steps."""
+    return (((time + h) * 1e9 + _TO_NEAREST) - _TO_NEAREST) * 1e-9
 
 
 @njit(error_model="numpy", allocates=False)
 def to_row(y: Variables, p: np.record, elapsed: float, row: StateRow) -> None:
-    """Variables y (≥ 15,), ``elapsed`` seconds after the segment's start, to a state row (13,)."""
+    """Variables y (VARIABLES,), ``elapsed`` seconds after the segment's start, to a state row (13,)."""
     P, Q = p.principal_axes, p.principal_quaternion
     c = p.reference_damping
     phi1, phi2 = damping_functions(c * elapsed)
@@ -294,6 +319,24 @@ def angular_acceleration(w: Vector, t: Vector, p: np.record) -> Vector:
 
 
 @njit(error_model="numpy", allocates=False)
+def rotor_momentum(time: float, p: np.record) -> Vector:
+    """h, ``time`` seconds into the segment."""
+    h, rate = p.rotor, p.rotor_torque
+    return h[0] + time * rate[0], h[1] + time * rate[1], h[2] + time * rate[2]
+
+
+@njit(error_model="numpy", allocates=False)
+def _torque_of_rotor(w: Vector, time: float, p: np.record) -> Vector:
+    """−ω × h − h'; without the gyroscopic term −h'."""
+    (a, b, c), rate, g = rotor_momentum(time, p), p.rotor_torque, p.gyroscopic
+    return (
+        g * (w[2] * b - w[1] * c) - rate[0],
+        g * (w[0] * c - w[2] * a) - rate[1],
+        g * (w[1] * a - w[0] * b) - rate[2],
+    )
+
+
+@njit(error_model="numpy", allocates=False)
 def knot(q: Quaternion, w: Vector, d: Vector, u: Vector, p: np.record) -> tuple[Vector, Vector]:
     """From the free end to the knot, a, and its rate a', world axes."""
     r, start = p.attach, p.string_start
@@ -332,15 +375,20 @@ def string_pull(
 
 @njit(error_model="numpy", allocates=False, forceinline=True)
 def accelerations(
-    q: Quaternion, w: Vector, d: Vector, u: Vector, p: np.record, taut: bool
+    q: Quaternion, w: Vector, d: Vector, u: Vector, time: float, p: np.record, taut: bool
 ) -> tuple[Vector, Vector, float, float]:
-    """ω' (principal axes), u' (world axes), power of the hand, power lost in the string's damper, for a unit q.
+    """ω' (principal axes), u' (world axes), power of the hand, power lost in the string's damper, for a unit q,
+    ``time`` seconds into the segment.
 
-    I ω' = τ − ω × Iω, without the gyroscopic term τ; u' is what ``acceleration`` gives and the string's F/m.
+    I ω' = τ − ω × (Iω + h) − h', without the gyroscopic term τ − h'; u' is what ``acceleration`` gives and the string's
+    F/m.
     """
-    if not p.translates:
-        return angular_acceleration(w, torque(q, w, p), p), (0.0, 0.0, 0.0), 0.0, 0.0
     tx, ty, tz = torque(q, w, p)
+    if p.has_rotor:
+        x, y, z = _torque_of_rotor(w, time, p)
+        tx, ty, tz = tx + x, ty + y, tz + z
+    if not p.translates:
+        return angular_acceleration(w, (tx, ty, tz), p), (0.0, 0.0, 0.0), 0.0, 0.0
     ax, ay, az = acceleration(q, u, p)
     work, heat = 0.0, 0.0
     if p.has_string:

@@ -12,6 +12,8 @@ from ..base.compilation import exported, njit
 from ..base.rotation import matrix_elements, matrix_from_quaternion, rotate, times, to_unit
 from ..base.vectors import Attitude, FloatArray, Matrix3, StateRow, Vector3
 
+NO_ROTOR = np.zeros(3)
+
 
 @dataclass(slots=True)
 class State:
@@ -58,9 +60,9 @@ class State:
         """½ m|v|² + ½ ωᵀIω [J]."""
         return kinetic_energy(self.row, mass, np.ravel(inertia))
 
-    def angular_momentum(self, inertia: Matrix3) -> Vector3:
-        """L = R I ω about the COM, world axes [N m s]."""
-        return np.array(angular_momentum(self.row, np.ravel(inertia)))
+    def angular_momentum(self, inertia: Matrix3, rotor: Vector3 = NO_ROTOR) -> Vector3:
+        """L = R (I ω + h) about the COM, world axes [N m s]; rotor: h of a flywheel (3,) [N m s, body axes]."""
+        return np.array(angular_momentum(self.row, np.ravel(inertia), rotor))
 
     def sha256(self) -> str:
         """SHA-256 of int64 time_ns, then float64 x, q xyzw, v, ω body, little-endian, with −0 written as +0."""
@@ -121,16 +123,18 @@ def kinetic_energy(row: FloatArray, mass: float, inertia: FloatArray) -> float:
     return float(0.5 * mass * (row[7] * row[7] + row[8] * row[8] + row[9] * row[9]) + 0.5 * turning)
 
 
-@exported("f8[:]", "f8[:]", returns="f8 f8 f8")
-def angular_momentum(row: FloatArray, inertia: FloatArray) -> tuple[float, float, float]:
-    """L = R I ω about the COM, world axes [N m s], of a state row (≥ 13,); inertia (9,) row by row."""
+@exported("f8[:]", "f8[:]", "f8[:]", returns="f8 f8 f8")
+def angular_momentum(row: FloatArray, inertia: FloatArray, rotor: Vector3) -> tuple[float, float, float]:
+    """L = R (I ω + h) about the COM, world axes [N m s], of a state row (≥ 13,); inertia (9,) row by row, rotor (3,): h
+    of a flywheel.
+    """
     x, y, z = row[10], row[11], row[12]
     return rotate(
         row[3],
         row[4],
         row[5],
         row[6],
-        inertia[0] * x + inertia[1] * y + inertia[2] * z,
-        inertia[3] * x + inertia[4] * y + inertia[5] * z,
-        inertia[6] * x + inertia[7] * y + inertia[8] * z,
+        inertia[0] * x + inertia[1] * y + inertia[2] * z + rotor[0],
+        inertia[3] * x + inertia[4] * y + inertia[5] * z + rotor[1],
+        inertia[6] * x + inertia[7] * y + inertia[8] * z + rotor[2],
     )

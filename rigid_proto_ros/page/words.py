@@ -41,7 +41,7 @@ def words() -> dict[str, Any]:
             InputError("initial.orientation_xyzw", "{0}", "four finite numbers x, y, z, w, not all zero")
         ).replace("'{0}'", "{0}"),
         "rate": [_refused(rf.RATE, k, numbers) for k in range(len(rf.RATES))],
-        "magnitude": _refused(rf.MAGNITUDE, 0, numbers),
+        "magnitude": [_refused(rf.MAGNITUDE, k, numbers) for k in range(len(rf.MAGNITUDES))],
         "pull": _refused(rf.PULL, 0, numbers),
         "freeEnd": _refused(rf.AT_FREE_END, 0, numbers),
         "integrator": _integrator(),

@@ -225,6 +225,22 @@ class InitialState:
 
 
 @dataclass(frozen=True, slots=True)
+class RotorParameters:
+    """A flywheel in the body."""
+
+    momentum: Vector = declare(
+        ZERO,
+        "Angular momentum of a flywheel relative to the body, body axes, at time 0 and again when it is changed.",
+        "N m s",
+    )
+    torque: Vector = declare(
+        ZERO,
+        "Torque that drives the flywheel, body axes: its momentum grows by it, and the body gets the opposite torque.",
+        "N m",
+    )
+
+
+@dataclass(frozen=True, slots=True)
 class StringParameters:
     """The string."""
 
@@ -355,6 +371,7 @@ class Parameters:
         0.0, "Damping force at the centre of mass, per velocity.", "N s/m", lower=0.0, upper=HUGE
     )
     angular_damping: float = declare(0.0, "Damping torque, per angular velocity.", "N m s", lower=0.0, upper=HUGE)
+    rotor: RotorParameters = RotorParameters()
     initial: InitialState = InitialState()
     integrator: str = declare(
         "auto",

@@ -95,6 +95,7 @@ class Picture:
         self._period_ns = 1_000_000_000 // rate
         self._vertices: Points | None = None
         self._middle = np.zeros(3)
+        self._rotor, self._rotor_ns = np.zeros(3), 0
         self._mesh: DrawnMesh | None = None
         self.restart()
 
@@ -120,7 +121,8 @@ class Picture:
         match event:
             case Started() | MeshChanged():
                 self._set_mesh(event.time_ns, event.vertices, event.triangles)
-            case BodyChanged(time_ns, setup):
+            case BodyChanged(time_ns, setup, rotor):
+                self._rotor, self._rotor_ns = np.array(rotor), time_ns
                 self._set_body(time_ns, setup)
             case GhostChanged(time_ns, setup):
                 self.set_ghost(time_ns, setup)
@@ -252,8 +254,12 @@ class Picture:
         R = matrix_from_quaternion(rows[:, 3:7])
         spin = np.einsum("nij,nj->ni", R, rows[:, 10:13])
         L = np.einsum("nij,jk,nk->ni", R, body.inertia, rows[:, 10:13])
+        torque = self.setup.scene.rotor_torque
+        has_rotor = bool(self._rotor.any() or torque.any())
+        if has_rotor:
+            L += np.einsum("nij,nj->ni", R, self._rotor + np.outer((times_ns - self._rotor_ns) * 1e-9, torque))
         if self._wanted(style.POINSOT):
-            self._poinsot.draw(backend, times_ns, rows, spin, L)
+            self._poinsot.draw(backend, times_ns, rows, spin, L, has_rotor)
         self._draw_motion(spin, L)
         each = np.ones(len(rows), dtype=int)
         if self.shape.tip is not None and self._wanted(style.TRAIL):

@@ -86,11 +86,15 @@ class Poinsot:
         I1, I2, _ = self._moments
         backend.place(style.POINSOT_ELLIPSOID, scale=(I1 * I2) ** 0.25 / np.sqrt(self._moments))
 
-    def draw(self, backend: Backend, times_ns: IntArray, rows: FloatArray, spin: Points, L: Points) -> None:
-        """Draw states (n, 13) at times (n,), with angular velocities and angular momenta (n, 3) in world axes."""
+    def draw(
+        self, backend: Backend, times_ns: IntArray, rows: FloatArray, spin: Points, L: Points, has_rotor: bool
+    ) -> None:
+        """Draw states (n, 13) at times (n,), with angular velocities and angular momenta (n, 3) in world axes. With a
+        flywheel L·ω isn't 2T, and nothing is drawn.
+        """
         w = rows[:, 10:13] @ self._axes
         energy = 0.5 * np.einsum("ni,i,ni->n", w, self._moments, w)
-        turns = np.linalg.norm(w, axis=1) > REST
+        turns = (np.linalg.norm(w, axis=1) > REST) & (not has_rotor)
         scale = np.zeros(len(w))
         scale[turns] = (self._moments[0] * self._moments[1]) ** 0.25 / np.sqrt(2.0 * energy[turns])
         changes = [k for k in range(len(w)) if self._changes(int(times_ns[k]), energy[k], L[k])]

@@ -72,7 +72,7 @@ box.
 class FlightTraits:
     """Properties of a flight that determine the layout. reach [m]: radius about the COM to be visible. mesh: it has a
     mesh. ghost: it has a ghost. falls: under gravity without a string. tied: to a string. dropped_term: the motion
-    lacks ω × Iω.
+    lacks ω × Iω. rotor: the body has a flywheel.
     """
 
     reach: float = 1.0
@@ -81,6 +81,7 @@ class FlightTraits:
     falls: bool = False
     tied: bool = False
     dropped_term: bool = False
+    rotor: bool = False
 
     @property
     def plots(self) -> list[str]:
@@ -122,7 +123,8 @@ def blueprint(traits: FlightTraits, finished: RunSummary | None = None) -> Any:
         if finished is None or style.COMMANDED in finished.plotted:
             below.append(_plot(style.COMMANDED, finished))
     row_shares = [4, 1]
-    if traits.ghost or not (traits.dropped_term or traits.tied or traits.falls):
+    free = not (traits.dropped_term or traits.tied or traits.falls)
+    if (traits.ghost or free) and not traits.rotor:
         # Free rotation: Poinsot's construction, beside the commands, where there is more room than above the plots.
         # Six commands, as `make run` has, are seen without scrolling in a window of 1600 x 900.
         listed = [rrb.Vertical(*below, row_shares=[3, 2][: len(below)])] if below else []

@@ -189,6 +189,7 @@ class RerunObserver(WritingObserver):
             falls=bool(np.any(setup.gravity)) and not tied,
             tied=tied,
             dropped_term=not setup.scene.gyroscopic,
+            rotor=bool(setup.flight.has_rotor),
         )
         if not traits.falls:
             # Below a falling body it would look like the ground.

@@ -357,6 +357,7 @@ def summary(run: OfflineRun, wall_time: float) -> dict[str, Any]:
         "kinetic_energy": simulation.kinetic_energy,
         "potential_energy": simulation.potential_energy,
         "angular_momentum": simulation.angular_momentum.tolist(),
+        "rotor_momentum": simulation.rotor_momentum.tolist(),
         "integrator": simulation.setup.integrator.name,
         "steps": simulation.steps,
         "force_evaluations": simulation.force_evaluations,

@@ -166,7 +166,8 @@ def branch_at(session: RecordedSession, time_ns: int) -> SceneAndScript:
     if simulation.failure:
         raise InputError("--at", time_ns / 1e9, f"a time before the motion failed: {simulation.failure}")
     entries = [*_load_entries(simulation), *_thruster_entries(simulation), *_string_entries(simulation)]
-    return SceneAndScript(_scene(again.scenario, row, _string_values(simulation)).text, entries)
+    changes = {**_string_values(simulation), "rotor.momentum": simulation.rotor_momentum.tolist()}
+    return SceneAndScript(_scene(again.scenario, row, changes).text, entries)
 
 
 def recorded_branch(session: RecordedSession, scenario: Scenario, time_ns: int) -> tuple[SceneAndScript, int]:
@@ -179,7 +180,9 @@ def recorded_branch(session: RecordedSession, scenario: Scenario, time_ns: int) 
         states = session.states
         span = f"{states.first_ns / 1e9:.9g} to {states.end_ns / 1e9:.9g} s" if states.count else "none"
         raise InputError("--at", time_ns / 1e9, f"a time of the recorded states, {span}")
-    return SceneAndScript(_scene(scenario, session.rows[before[-1]], {}).text, []), int(session.times[before[-1]])
+    row, at_ns, rotor = session.rows[before[-1]], int(session.times[before[-1]]), scenario.parameters.rotor
+    driven = [h + 1e-9 * at_ns * torque for h, torque in zip(rotor.momentum, rotor.torque, strict=True)]
+    return SceneAndScript(_scene(scenario, row, {"rotor.momentum": driven}).text, []), at_ns
 
 
 def _scene(scenario: Scenario, row: StateRow, changes: dict[str, object]) -> Scenario:

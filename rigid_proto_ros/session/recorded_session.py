@@ -466,7 +466,7 @@ def play(
         if given is None:
             raise InputError("session", ", ".join(session.missing), "--scene FILE, to draw it")
         notify_start(observer, given)
-        observer.on(BodyChanged(0, given.setup))
+        observer.on(BodyChanged(0, given.setup, given.parameters.rotor.momentum))
     else:
         again = resimulation(session, observer)
         again.announce()

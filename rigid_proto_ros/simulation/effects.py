@@ -12,7 +12,7 @@ import numpy as np
 
 from ..base.compilation import copy_numbers, exported, local_numbers, njit
 from ..base.rotation import matrix_elements
-from ..base.vectors import FloatArray, Points, Records, Triangles
+from ..base.vectors import FloatArray, Points, Records, Triangles, Vector
 from ..motion.body import BODY, COM, MASS, BodyRow
 from ..motion.loads import (
     AT_COM,
@@ -34,9 +34,9 @@ from . import flight as fl
 from . import refusals as rf
 from .commands import CLEAR, MOVE_STRING, RELEASE_STRING, SET_STATE, TIE_STRING
 from .flight import EVENT, FLIGHT, LOAD_ROW
-from .record import MESH, SCENE, make_body, meets, needs_of, set_rules
+from .record import MESH, SCENE, make_body, meets, needs_of, set_rules, takes_rotor
 from .refusals import REFUSAL, refuse
-from .string_control import begins_clear, change_string, follows_rates, move_knot, move_string
+from .string_control import begins_clear, change_string, follows_rates, move_knot, move_string, same_vector
 
 FLY, BEGIN, APPLY, CUT, FINISH, END_DUE, END_ALL = range(7)
 """Operations of a call, at the flight's current time. APPLY: apply the commands put last. CUT: end the segment,
@@ -177,6 +177,14 @@ def command(
 
 
 @njit(error_model="numpy", allocates=False)
+def _rotor_after(old: np.record, new: np.record, flight: np.record) -> Vector:
+    """The flywheel's momentum after a change: what it is, unless the change says another one."""
+    if same_vector(old.rotor_momentum, new.rotor_momentum):
+        return fl.rotor_momentum(flight, flight.now_ns)
+    return new.rotor_momentum[0], new.rotor_momentum[1], new.rotor_momentum[2]
+
+
+@njit(error_model="numpy", allocates=False)
 def _may_follow(
     old: np.record, new: np.record, body: BodyRow, flight: np.record, loads: Records, refusal: np.record
 ) -> bool:
@@ -188,7 +196,7 @@ def _may_follow(
     needs = needs_of(new, tied)
     for row in range(flight.acting):
         needs |= needs_of_load(loads[row].load)
-    if not meets(new, needs, refusal):
+    if not meets(new, needs, refusal) or not takes_rotor(new, body, _rotor_after(old, new, flight), refusal):
         return False
     moved = False
     for k in range(3):
@@ -244,5 +252,7 @@ def change(
     begin_body(flight.common, body, new, 1.0 if new.gyroscopic else 0.0)
     set_rules(new, flight)
     fl.take_body(flight, loads)
+    if not (same_vector(old.rotor_momentum, new.rotor_momentum) and same_vector(old.rotor_torque, new.rotor_torque)):
+        fl.take_rotor(flight, _rotor_after(old, new, flight), new.rotor_torque)
     change_string(old, new, flight, before)
     return True

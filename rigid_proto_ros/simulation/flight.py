@@ -16,7 +16,7 @@ import numpy as np
 from ..base.arithmetic import exponent_of, scaled
 from ..base.compilation import copy_numbers, copy_record, exported, njit, record_type
 from ..base.rotation import norm
-from ..base.vectors import FloatArray, Records, StateRow
+from ..base.vectors import FloatArray, Records, StateRow, Vector, Vector3
 from ..motion import body as of_body
 from ..motion.integrators.auto import kind_of_segment
 from ..motion.integrators.integrator import ADAPTIVE, FIXED_STEPS
@@ -45,10 +45,12 @@ from ..motion.problem import (
     HEAT,
     MAX_SPEED,
     PROBLEM,
+    TIME,
     VARIABLES,
     Variables,
     accelerations,
     begin_problem,
+    begin_rotor,
     begin_string,
     parts_of,
     tension_margin,
@@ -83,6 +85,11 @@ FLIGHT = record_type(
         ("string_last_ns", np.int64),
         ("string_release_ns", np.int64),
         ("string_attach", np.float64, 3),
+        # The flywheel: its momentum [N m s, body axes] at rotor_ns, and what has driven it since then [N m].
+        ("has_rotor", np.bool_),
+        ("rotor", np.float64, 3),
+        ("rotor_torque", np.float64, 3),
+        ("rotor_ns", np.int64),
         ("sums", np.float64, LOADS_SIZE),  # sums of the active loads
         # Settings. A timeout of 0 means no timeout.
         ("accuracy", np.float64),
@@ -204,6 +211,25 @@ def complete_problem(flight: np.record, row: StateRow, time_ns: int, p: np.recor
     begin_problem(p, flight.sums, row)
     if flight.tied:
         begin_string(p, flight.body, flight.string, flight.string_begin_ns, flight.string_end_ns, row, time_ns)
+    if flight.has_rotor:
+        torque = flight.rotor_torque
+        begin_rotor(p, rotor_momentum(flight, time_ns), (torque[0], torque[1], torque[2]))
+
+
+@njit(error_model="numpy", allocates=False)
+def rotor_momentum(flight: np.record, time_ns: int) -> Vector:
+    """The flywheel's momentum at ``time_ns`` [N m s, body axes]."""
+    h, rate, t = flight.rotor, flight.rotor_torque, (time_ns - flight.rotor_ns) * 1e-9
+    return h[0] + t * rate[0], h[1] + t * rate[1], h[2] + t * rate[2]
+
+
+@njit(error_model="numpy", allocates=False)
+def take_rotor(flight: np.record, h: Vector, torque: Vector3) -> None:
+    """From now_ns on the flywheel has the momentum h and is driven by ``torque`` (3,)."""
+    for k in range(3):
+        flight.rotor[k], flight.rotor_torque[k] = h[k], torque[k]
+    flight.rotor_ns = flight.now_ns
+    flight.has_rotor = bool(flight.rotor.any() or flight.rotor_torque.any())
 
 
 @njit(error_model="numpy", allocates=False, forceinline=True)
@@ -285,7 +311,7 @@ def accelerations_now(flight: np.record, problem: Records, y: Variables) -> tupl
     complete_problem(flight, flight.row, flight.now_ns, p)
     to_variables(flight.row, p, y)
     q, w, d, u = parts_of(y)
-    (ex, ey, ez), (ax, ay, az), _, _ = accelerations(q, w, d, u, p, tension_margin(y, p) > 0.0)
+    (ex, ey, ez), (ax, ay, az), _, _ = accelerations(q, w, d, u, y[TIME], p, tension_margin(y, p) > 0.0)
     a, v, P, c = p.reference_acceleration, p.reference_velocity, p.principal_axes, p.reference_damping
     return (
         *(a[0] - c * v[0] + ax, a[1] - c * v[1] + ay, a[2] - c * v[2] + az),

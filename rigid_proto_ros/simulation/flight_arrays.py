@@ -43,8 +43,8 @@ def _numbers(*names: str) -> list[int]:
     return [place_of(FLIGHT, name) // 8 for name in names]
 
 
-_NOW_NS, _START_NS, _ACTING, _DUE, _DUE_END, _EVENTS = _numbers(
-    "now_ns", "start_ns", "acting", "due", "due_end", "events"
+_NOW_NS, _START_NS, _ACTING, _DUE, _DUE_END, _EVENTS, _ROTOR_NS = _numbers(
+    "now_ns", "start_ns", "acting", "due", "due_end", "events", "rotor_ns"
 )
 NOTEWORTHY, _LOAD_IDS, _METHOD = _numbers("noteworthy", "load_ids", "method")
 _REACHED = fl.REACHED
@@ -148,6 +148,7 @@ class FlightArrays:
     def leap(self, to_ns: int) -> None:
         """Go on at a later time in the same state, with what acts; what is due by then hasn't ended yet."""
         self.call(CUT, 0)
+        self.integers[_ROTOR_NS] += to_ns - self.integers[_NOW_NS]  # a flywheel keeps its momentum
         self.integers[_NOW_NS] = self.integers[_START_NS] = to_ns
         self.call(FINISH, 0)
 

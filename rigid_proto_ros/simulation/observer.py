@@ -15,7 +15,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
-from ..base.vectors import Attitude, Points, StateRow, Triangles, Vector3
+from ..base.vectors import Attitude, Points, StateRow, Triangles, Vector, Vector3
 from .commands import Command
 
 if TYPE_CHECKING:
@@ -88,10 +88,13 @@ class SceneChanged(NamedTuple):
 
 
 class BodyChanged(NamedTuple):
-    """The body is the one of this setup from ``time_ns`` on; comes once at the start and again at every change."""
+    """The body is the one of this setup from ``time_ns`` on; comes once at the start and again at every change. rotor:
+    momentum of its flywheel at that time [N m s, body axes], which the setup's torque drives from then on.
+    """
 
     time_ns: int
     setup: Setup
+    rotor: Vector = (0.0, 0.0, 0.0)
 
 
 class MeshChanged(NamedTuple):

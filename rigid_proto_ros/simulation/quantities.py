@@ -2,9 +2,9 @@
 """Scalar quantities of a flight by name, and measures of a flight.
 
 A quantity is a function of a state row (STATE,) and of a context row (CONTEXT,). A state row holds the state, the
-string's energy, and the mass, tensor and gravity of that moment, since a script may change them in flight. The context
-is the state, energy and angular momentum at time 0. A measure is a row (MEASURE,): a kind, the number of a quantity or
-difference, and the kind's parameters. It reduces the states at the sample times to one number.
+string's energy, and the mass, tensor, gravity and flywheel of that moment, since a script may change them in flight.
+The context is the state, energy and angular momentum at time 0. A measure is a row (MEASURE,): a kind, the number of a
+quantity or difference, and the kind's parameters. It reduces the states at the sample times to one number.
 """
 
 from __future__ import annotations
@@ -20,7 +20,7 @@ from ..base.vectors import Attitude, FloatArray, IntArray
 from ..motion.body import INERTIA as BODY_INERTIA
 from ..motion.body import MASS as BODY_MASS
 from ..motion.state import angular_momentum, kinetic_energy
-from .flight import FLIGHT
+from .flight import FLIGHT, rotor_momentum
 from .record import SCENE
 from .string_control import string_energy
 
@@ -60,9 +60,10 @@ SPEED, SPIN, DISTANCE, TURNED, KINETIC, POTENTIAL, ENERGY, DRIFT, MOMENTUM, MOME
 DIFFERENCES = {"attitude": "rad", "position": "m", "velocity": "m/s", "spin": "rad/s"}
 """Differences between two states; velocities and spins are compared in world axes."""
 
-STRING_ENERGY, MASS, INERTIA, GRAVITY, STATE = 13, 14, 15, 24, 27
+STRING_ENERGY, MASS, INERTIA, GRAVITY, ROTOR, STATE = 13, 14, 15, 24, 27, 30
 """Where a state row has, after the state (13,), the string's energy [J], the mass [kg], the tensor (9,) about the
-centre of mass in body axes [kg m²] and gravity (3,) [m/s², world]; and its length.
+centre of mass in body axes [kg m²], gravity (3,) [m/s², world] and the flywheel's momentum (3,) [N m s, body axes]; and
+its length.
 """
 
 START, START_ENERGY, START_MOMENTUM, CONTEXT = 0, 13, 14, 17
@@ -70,7 +71,7 @@ START, START_ENERGY, START_MOMENTUM, CONTEXT = 0, 13, 14, 17
 
 @njit(error_model="numpy", allocates=False)
 def _momentum(row: FloatArray) -> tuple[float, float, float]:
-    return angular_momentum(row, row[INERTIA : INERTIA + 9])
+    return angular_momentum(row, row[INERTIA : INERTIA + 9], row[ROTOR : ROTOR + 3])
 
 
 @njit(error_model="numpy", allocates=False)
@@ -103,6 +104,7 @@ def state_of(scene: np.record, flight: np.record, row: FloatArray) -> None:
     row[STRING_ENERGY], row[MASS] = string_energy(flight), body[BODY_MASS]
     copy_numbers(body[BODY_INERTIA : BODY_INERTIA + 9], row[INERTIA : INERTIA + 9])
     copy_numbers(scene.gravity, row[GRAVITY : GRAVITY + 3])
+    row[ROTOR], row[ROTOR + 1], row[ROTOR + 2] = rotor_momentum(flight, flight.now_ns)
 
 
 @exported("f8[:]", "f8[:]")

@@ -27,7 +27,8 @@ from ..base.compilation import (
     record_type,
 )
 from ..base.errors import InputError
-from ..base.vectors import BoolArray, FloatArray, Matrix3, Vector3
+from ..base.rotation import norm
+from ..base.vectors import BoolArray, FloatArray, Matrix3, Vector, Vector3
 from ..mass import MODEL_COMS
 from ..mass.closed_form import (
     given_mass,
@@ -42,24 +43,26 @@ from ..mass.moments import MODELS, MOMENTS, SOLID, STRETCHED
 from ..mass.properties import SCALE_LIMITS
 from ..mass.tensor import NEARLY, POSSIBLE, judged_tensor
 from ..mass.walls import LIMIT, WALLS
-from ..motion.body import LENGTH, BodyRow, fill_body
+from ..motion.body import LENGTH, MASS, MAX_ACCELERATION, BodyRow, fill_body, rotor_rate
+from ..motion.body import MOMENTS as BODY_MOMENTS
 from ..motion.integrators import INTEGRATORS
+from ..motion.integrators.auto import FASTEST
 from ..motion.integrators.series_steps import degree_for
-from ..motion.loads import NEED_ANGULAR_DAMPING, NEED_NO_GYROSCOPIC_TERM, NEED_STRING, NEEDS
+from ..motion.loads import NEED_ANGULAR_DAMPING, NEED_NO_GYROSCOPIC_TERM, NEED_ROTOR, NEED_STRING, NEEDS
 from ..motion.problem import begin_body
 from ..motion.state import fill_initial_row
 from ..parameters.declarations import PARAMETERS, PATTERNS, Parameter
 from . import refusals as rf
-from .flight import FLIGHT, NEVER, NOT_BEGUN
+from .flight import FLIGHT, NEVER, NOT_BEGUN, take_rotor
 from .refusals import REFUSAL, refuse, refuse_tensor
-from .string_control import begins_clear, follows_rates, tie
+from .string_control import begins_clear, follows, follows_rates, tie
 
 MAX_BALLASTS = 32
 
 SCENE_PARAMETERS = (
     *("scale", "mass", "density", "inertia_model", "inertia_model_com", "wall_thickness", "infill"),
     *("explicit_inertia.mass", "explicit_inertia.center_of_mass", "explicit_inertia.tensor"),
-    *("gyroscopic", "gravity", "linear_damping", "angular_damping"),
+    *("gyroscopic", "gravity", "linear_damping", "angular_damping", "rotor.momentum", "rotor.torque"),
     *("initial.position", "initial.orientation_xyzw", "initial.linear_velocity", "initial.angular_velocity"),
     *("initial.string_mass", "integrator", "step", "accuracy", "wrench_timeout", "poke_duration"),
     *("string.attached", "string.attach", "string.target", "string.stiffness", "string.frequency"),
@@ -359,6 +362,21 @@ def needs_of(scene: np.record, tied: bool) -> int:
 
 
 @njit(error_model="numpy", allocates=False)
+def takes_rotor(scene: np.record, body: BodyRow, h: Vector, refusal: np.record) -> bool:
+    """Whether integrator and body of a scene can take a flywheel of momentum h [N m s, body axes] and its torque."""
+    torque = scene.rotor_torque
+    turns, driven = norm(h[0], h[1], h[2]), norm(torque[0], torque[1], torque[2])
+    if turns == 0.0 and driven == 0.0:
+        return True
+    if not meets(scene, NEED_ROTOR, refusal):
+        return False
+    if not driven / body[BODY_MOMENTS] <= MAX_ACCELERATION:
+        return refuse(refusal, rf.MAGNITUDE, rf.OF_ROTOR, 0.0, driven / body[BODY_MOMENTS], body[MASS])
+    rate = rotor_rate(body, h)
+    return scene.integrator != rf.AUTO or follows(rf.ROTOR_MOMENTUM, turns, turns / rate * FASTEST, rate, refusal)
+
+
+@njit(error_model="numpy", allocates=False)
 def meets(scene: np.record, needs: int, refusal: np.record) -> bool:
     """Whether the scene's integrator supports all of these needs."""
     if needs & ~_SUPPORTS[scene.integrator] == 0:
@@ -397,6 +415,10 @@ def begin_with_body(scene: np.record, flight: np.record, refusal: np.record) -> 
         return False
     if not follows_rates(scene, body, scene.string_attached, scene.string_attach, refusal):
         return False
+    h = scene.rotor_momentum[0], scene.rotor_momentum[1], scene.rotor_momentum[2]
+    if not takes_rotor(scene, body, h, refusal):
+        return False
+    take_rotor(flight, h, scene.rotor_torque)
     if scene.string_attached:
         if not begins_clear(scene, body, flight.row, scene.string_attach, scene.string_target, refusal):
             return False

@@ -34,7 +34,7 @@ REFUSAL = record_type(
     ORIENTATION,
     INTEGRATOR,  # detail: number of the integrator; numbers: bits of what the scene needs (motion/loads.py, NEEDS)
     RATE,  # detail: RATES; numbers: value, largest one, rate [1/s]
-    MAGNITUDE,  # numbers: linear and angular acceleration [m/s², rad/s²], mass [kg]
+    MAGNITUDE,  # detail: MAGNITUDES; numbers: linear and angular acceleration [m/s², rad/s²], mass [kg]
     PULL,  # of a string's target; numbers: the target
     UNRESOLVED,  # detail: why a load's point wasn't found (motion/loads.py)
     OUT_OF_BOUNDS,  # detail: place of the number in SCENE (simulation/record.py); numbers: the number
@@ -48,11 +48,16 @@ RATES = (
     ("string.frequency", "rad/s"),
     ("string.stiffness", "N/m"),
     ("string.damping_ratio", ""),
+    ("rotor.momentum", "N m s"),
 )
 AUTO = tuple(INTEGRATORS).index("auto")
 
-LINEAR_DAMPING, ANGULAR_DAMPING, STRING_FREQUENCY, STRING_STIFFNESS, STRING_DAMPING_RATIO = range(5)
+LINEAR_DAMPING, ANGULAR_DAMPING, STRING_FREQUENCY, STRING_STIFFNESS, STRING_DAMPING_RATIO, ROTOR_MOMENTUM = range(6)
 """Parameters whose rates ``auto`` follows up to FASTEST, and their units."""
+
+MAGNITUDES = ("wrench", "rotor.torque")
+OF_WRENCH, OF_ROTOR = range(2)
+"""What may be too large for a body."""
 
 
 @njit(error_model="numpy", allocates=False)
@@ -88,7 +93,7 @@ def refused_command(refusal: np.record) -> CommandRefused:
     if refusal.code == MAGNITUDE:
         received = f"{a:.3g} m/s² and {b:.3g} rad/s²"
         accepted = f"at most {MAX_ACCELERATION:g} of each for a body of {c:g} kg"
-        return CommandRefused("magnitude", "wrench", received, accepted)
+        return CommandRefused("magnitude", MAGNITUDES[refusal.detail], received, accepted)
     if refusal.code == AT_FREE_END:
         accepted = "a target away from the knot, where a string that pushes has a direction"
         return CommandRefused("integrator", "string target", [a, b, c], accepted)

@@ -17,6 +17,7 @@ import numpy as np
 from ..base.errors import CommandRefused, InputError
 from ..base.rotation import cross, dot, length, times, transposed_times
 from ..base.vectors import FloatArray, Numbers, Vector, Vector3, vector
+from ..motion.body import rotor_rate
 from ..motion.integrators.series_steps import degree_of_motion, fastest_swing
 from ..motion.integrators.stepping import method_of
 from ..motion.loads import TORQUE_WORLD, Load, load_of_bytes
@@ -111,7 +112,7 @@ class Simulation:
 
     def introduce(self, observer: Observer) -> None:
         """Notify an observer that joins a running simulation of the body, the active loads and the string."""
-        observer.on(BodyChanged(self.time_ns, self.setup))
+        observer.on(self._body())
         for acting in self.acting:
             shown = shown_load(acting.shown_kind, acting.load, self.setup.body)
             observer.on(LoadBegan(self.time_ns, acting.load_id, shown))
@@ -119,7 +120,10 @@ class Simulation:
 
     def announce(self) -> None:
         """Notify the observer of the current body."""
-        self.observer.on(BodyChanged(self.time_ns, self.setup))
+        self.observer.on(self._body())
+
+    def _body(self) -> BodyChanged:
+        return BodyChanged(self.time_ns, self.setup, self._rotor_at(self.time_ns))
 
     def notify_floor(self, at_end: bool = False) -> None:
         """Notify the observer of the error floors if they have changed: every FLOOR_PERIOD_NS, and at the end of a run
@@ -560,12 +564,17 @@ class Simulation:
 
     @property
     def too_coarse(self) -> str:
-        """Message if the fixed step is too long, with |ω|h or ω_s h above the integrator's limit; empty otherwise."""
+        """Message if the fixed step is too long, with |ω|h, ω_s h of a string or a flywheel's rate times h above the
+        integrator's limit; empty otherwise.
+        """
         setup = self.setup
         limit, h = setup.integrator.stability_limit, int(self.flight.step_ns) * 1e-9
         spin = length(self.state.angular_velocity_body) * h
         string = self.string
         swing = string.frequency * h if string else 0.0
+        rotor = rotor_rate(setup.body.row, self._rotor_at(self.time_ns)) * h
+        if rotor > limit:
+            return f"{setup.integrator.name}: rate of the flywheel times step = {rotor:.3g}, good up to {limit:g}"
         if spin > limit:
             return f"{setup.integrator.name}: |w| step = {spin:.3g}, good up to {limit:g}"
         if swing > limit:
@@ -610,8 +619,16 @@ class Simulation:
 
     @property
     def angular_momentum(self) -> Vector3:
-        """R I ω about the COM (3,) [N m s, world]."""
-        return self.state.angular_momentum(self.setup.body.inertia)
+        """R (I ω + h) about the COM (3,) [N m s, world]."""
+        return self.state.angular_momentum(self.setup.body.inertia, self.rotor_momentum)
+
+    @property
+    def rotor_momentum(self) -> Vector3:
+        """h of the flywheel (3,) [N m s, body axes]."""
+        return np.array(self._rotor_at(self.time_ns))
+
+    def _rotor_at(self, time_ns: int) -> Vector:
+        return fl.rotor_momentum(self.flight, time_ns)
 
     @property
     def angular_momentum_drift(self) -> float:
@@ -621,7 +638,8 @@ class Simulation:
             return 0.0
         if self.setup.scene.angular_damping or not self.setup.scene.gyroscopic:
             return 0.0
-        start = np.array(angular_momentum(self.flight.start, self.setup.body.inertia.ravel()))
+        rotor = np.array(self._rotor_at(int(self.flight.start_ns)))
+        start = np.array(angular_momentum(self.flight.start, self.setup.body.inertia.ravel(), rotor))
         moved, size = self.angular_momentum - start, length(start)
         return length(moved) / size if size > 0.0 else 0.0
 

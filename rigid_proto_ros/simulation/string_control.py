@@ -55,8 +55,10 @@ world.
 
 
 @njit(error_model="numpy", allocates=False)
-def _follows(parameter: int, value: float, most: float, rate: float, refusal: np.record) -> bool:
-    """most: the value that gives the rate FASTEST [1/s or rad/s]."""
+def follows(parameter: int, value: float, most: float, rate: float, refusal: np.record) -> bool:
+    """Whether an integrator that chooses its own steps can follow a parameter of RATES. most: the value that gives the
+    rate FASTEST [1/s or rad/s].
+    """
     if rate > FASTEST and value > most:
         return refuse(refusal, rf.RATE, parameter, value, most, rate)
     return True
@@ -71,9 +73,9 @@ def follows_rates(scene: np.record, body: BodyRow, tied: bool, knot: Vector3, re
         return True
     mass, least = body[MASS], body[MOMENTS]
     linear, angular = scene.linear_damping, scene.angular_damping
-    if not _follows(rf.LINEAR_DAMPING, linear, mass * FASTEST, linear / mass, refusal):
+    if not follows(rf.LINEAR_DAMPING, linear, mass * FASTEST, linear / mass, refusal):
         return False
-    if not _follows(rf.ANGULAR_DAMPING, angular, least * FASTEST, angular / least, refusal):
+    if not follows(rf.ANGULAR_DAMPING, angular, least * FASTEST, angular / least, refusal):
         return False
     if not tied:
         return True
@@ -87,12 +89,12 @@ def follows_rates(scene: np.record, body: BodyRow, tied: bool, knot: Vector3, re
     stiffness = mass * frequency * frequency if frequency > 0.0 else scene.string_stiffness
     swing = math.sqrt(stiffness * yields)
     if frequency > 0.0:
-        good = _follows(rf.STRING_FREQUENCY, frequency, FASTEST / math.sqrt(mass * yields), swing, refusal)
+        good = follows(rf.STRING_FREQUENCY, frequency, FASTEST / math.sqrt(mass * yields), swing, refusal)
     else:
-        good = _follows(rf.STRING_STIFFNESS, stiffness, FASTEST * FASTEST / yields, swing, refusal)
+        good = follows(rf.STRING_STIFFNESS, stiffness, FASTEST * FASTEST / yields, swing, refusal)
     damping, ratio = 2.0 * math.sqrt(stiffness * mass) * yields, scene.string_damping_ratio
     most = FASTEST / damping if damping > 0.0 else math.inf
-    return good and _follows(rf.STRING_DAMPING_RATIO, ratio, most, ratio * damping, refusal)
+    return good and follows(rf.STRING_DAMPING_RATIO, ratio, most, ratio * damping, refusal)
 
 
 @njit(error_model="numpy", allocates=False)
@@ -288,7 +290,8 @@ def move_knot(
 
 
 @njit(error_model="numpy", allocates=False)
-def _same(a: Vector3, b: Vector3) -> bool:
+def same_vector(a: Vector3, b: Vector3) -> bool:
+    """Whether all three numbers are the same."""
     return bool(a[0] == b[0] and a[1] == b[1] and a[2] == b[2])
 
 
@@ -309,7 +312,7 @@ def change_string(old: np.record, new: np.record, flight: np.record, old_body: B
     """Apply changed parameters or a changed body. A change of ``string.attached`` itself ties or releases the string.
     The flight has the new body and timeout already.
     """
-    same_knot = _same(old.string_attach, new.string_attach)
+    same_knot = same_vector(old.string_attach, new.string_attach)
     if not same_knot:
         copy_numbers(new.string_attach, flight.string_attach)
     if new.string_attached != old.string_attached:
@@ -321,7 +324,7 @@ def change_string(old: np.record, new: np.record, flight: np.record, old_body: B
         return
     copy_numbers(flight.string_attach, flight.string[KNOT : KNOT + 3])
     timeout_ns, holds = flight.string_timeout_ns, new.string_attached
-    if not _same(old.string_target, new.string_target):
+    if not same_vector(old.string_target, new.string_target):
         # One that parameters tie has no timeout.
         _lead(flight, new.string_target, 0 if holds else timeout_ns)
     if old.string_timeout != new.string_timeout and not (holds and flight.string_release_ns == NEVER):

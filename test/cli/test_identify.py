@@ -45,6 +45,17 @@ def test_a_poked_session_gives_back_the_body_that_was_flown(flight: tuple, capsy
     assert found["inertia"]["izz"]["value"] == pytest.approx(truth["inertia"][2][2], rel=1e-6)
 
 
+def test_a_session_with_a_flywheel_is_refused_in_one_line(tmp_path: Path, capsys: pytest.CaptureFixture) -> None:
+    bag = str(tmp_path / "wheel.mcap")
+    wheel = ["--set", "rotor.momentum=[0.0, 1e-4, 0.0]"]
+    assert main(["simulate", "t_handle", "--duration", "0.5", "--bag", bag, *wheel]) == 0
+    assert main(["replay", bag, "--verify"]) == 0
+    capsys.readouterr()
+    assert main(["identify", bag]) == 2
+    (line,) = capsys.readouterr().err.splitlines()
+    assert "has a flywheel" in line
+
+
 def test_held_wrenches_count_as_long_as_they_acted(tmp_path: Path, capsys: pytest.CaptureFixture) -> None:
     # Each of its own slot: for a time that is longer or shorter than the timeout, replaced, and ended by hand; and a poke
     # that is ended in the moment in which it begins.

@@ -11,19 +11,20 @@ from reference_scenes import BODY, ROW, log_uniform, random_body
 from rigid_proto_ros.base.errors import CommandRefused
 from rigid_proto_ros.motion.body import make_body
 from rigid_proto_ros.motion.integrators import INTEGRATORS
-from rigid_proto_ros.motion.loads import ANGULAR_DAMPING
+from rigid_proto_ros.motion.loads import ANGULAR_DAMPING, ROTOR
 from rigid_proto_ros.simulation.commands import Change, MoveString, ReleaseString
 
 FRAMES = ("world@com", "world@point/.1,.2,.3", "body@point/.1,.2,.3", "body", "world@com;impulse")
-CHANGES = ("mass", "body", "gravity", "damping", "step", "string", "gyroscopic")
+CHANGES = ("mass", "body", "gravity", "damping", "step", "string", "gyroscopic", "wheel", "motor")
 END = 10 * SECOND
 
 
 def random_change(rng, simulation) -> Change:
-    """Another mass, tensor, gravity, damping, step or string, from the values in force when it acts."""
+    """Another mass, tensor, gravity, damping, step, string or flywheel, from the values in force when it acts."""
     kind = rng.choice(CHANGES)
     mass, body, gravity = log_uniform(rng, 1.0, 4.0), random_body(rng, 2.0, 1.5, 0.5), 9.81 * rng.normal(size=3)
     linear, angular = (log_uniform(rng, 1e-3, 0.3) for _ in range(2))
+    wheel, motor = rng.normal(size=3), rng.normal(size=3)
     step_ns, stiffness = int(rng.integers(SECOND // 1000, SECOND // 50)), log_uniform(rng, 10.0, 100.0)
 
     def apply():
@@ -36,6 +37,8 @@ def random_change(rng, simulation) -> Change:
             "step": {"step": step_ns * 1e-9},
             "string": {"string_stiffness": stiffness},
             "gyroscopic": {"gyroscopic": not now.scene.gyroscopic},
+            "wheel": {"rotor_momentum": wheel},
+            "motor": {"rotor_torque": motor},
         }
         return changed(now, **changes[kind])
 
@@ -45,6 +48,7 @@ def random_change(rng, simulation) -> Change:
 def flown(name, seed, portions):
     """A flight with forty commands of all kinds at random times, some at the same; what the integrator can't carry is refused."""
     damping = 0.05 if ANGULAR_DAMPING in INTEGRATORS[name].supports else 0.0
+    motor = (0.1, -0.2, 0.3) if ROTOR in INTEGRATORS[name].supports else (0.0, 0.0, 0.0)
     simulation = flight(
         BODY,
         integrator=name,
@@ -53,6 +57,7 @@ def flown(name, seed, portions):
         gravity=np.array((0.0, 0.0, -9.81)),
         linear_damping=0.1,
         angular_damping=damping,
+        rotor_torque=motor,
         wrench_timeout=3.0,
         string=StringSettings(stiffness=80.0, rest_length=0.5),
     )

@@ -15,6 +15,7 @@ from reference_taylor import DIGITS, ReferenceProblem, ReferenceString, referenc
 
 from rigid_proto_ros.motion.integrators.series_steps import floor_of_step, heavier, scales
 from rigid_proto_ros.motion.integrators.string_law import PULLS, law_of
+from rigid_proto_ros.motion.problem import TIME
 from rigid_proto_ros.simulation.flight import steps_of_segment
 from rigid_proto_ros.simulation.simulation import Simulation
 
@@ -49,7 +50,7 @@ class CommittedStep:
     def error(self) -> float:
         """In principal axes; the position is the displacement added to a motion in closed form, the velocity both."""
         span = (self.end_ns - self.begin_ns) * 1e-9
-        (exact,) = reference_motion(reference_problem(self.problem), row_of(self.before), [span], DIGITS)
+        (exact,) = reference_motion(reference_problem(self.problem, self.before), row_of(self.before), [span], DIGITS)
         row, closed = row_of(self.after), _closed_form_velocity(self.problem, self.end_ns * 1e-9)
         exact[7:10] = [a + float(b) for a, b in zip(exact[7:10], closed, strict=True)]
         row[7:10] += closed
@@ -69,8 +70,8 @@ def _closed_form_velocity(p: np.record, time: float) -> np.ndarray:
     return v * decay + a * (1.0 - decay) / c
 
 
-def reference_problem(p: np.record) -> ReferenceProblem:
-    """The same motion in principal axes for the reference; its position is the added displacement."""
+def reference_problem(p: np.record, variables: np.ndarray) -> ReferenceProblem:
+    """The same motion in principal axes for the reference, from these variables on; its position is the added displacement."""
     string, mass = None, np.longdouble(p.mass)
     if p.has_string:
         string = ReferenceString(
@@ -89,6 +90,8 @@ def reference_problem(p: np.record) -> ReferenceProblem:
         angular_damping=p.damping_angular,
         gyroscopic=bool(p.gyroscopic),
         string=string,
+        rotor=p.rotor + variables[TIME] * p.rotor_torque,
+        rotor_torque=p.rotor_torque,
     )
 
 
@@ -127,7 +130,11 @@ def check(features: dict, accuracy: float, seed: int) -> None:
 
 
 ACCURACIES = (1e-3, 1e-6, 1e-9, 1e-12)
-OR_STIFF = {**FEATURES, "frequency": (*FEATURES["frequency"], (30.0, 300.0))}
+OR_STIFF = {
+    **FEATURES,
+    "frequency": (*FEATURES["frequency"], (30.0, 300.0)),
+    "rotor": ("none", "none", "steady", "driven"),
+}
 
 
 @settings(max_examples=40, deadline=None)

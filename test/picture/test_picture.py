@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 import rerun_flight as flight
 from drawn import Drawn
-from flights import StringSettings, flight_setup
+from flights import SECOND, StringSettings, changed, flight_setup
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from judged_meshes import body, volume
@@ -24,12 +24,14 @@ from rigid_proto_ros.picture.picture import Picture, Shape, angle_to
 from rigid_proto_ros.picture.poinsot import polhode
 from rigid_proto_ros.picture.string import POINTS, string_curves
 from rigid_proto_ros.picture.surface import ball_mesh, box_mesh, shaded_surface
+from rigid_proto_ros.simulation.commands import Change
 from rigid_proto_ros.simulation.observer import (
     BodyChanged,
     GhostChanged,
     LoadBegan,
     LoadEnded,
     MeshChanged,
+    Observer,
     ShownLoad,
     Started,
     StringChanged,
@@ -308,6 +310,38 @@ def test_the_drawn_ellipsoid_touches_the_drawn_plane_where_the_spin_ends():
         (curve,) = polhodes[time_ns]
         assert np.linalg.norm(curve - principal, axis=1).min() < 0.1
     assert touched >= 8 and touched < len(planes)
+
+
+def test_momentum_is_that_of_body_and_flywheel_and_with_one_nothing_rolls():
+    class ToPicture(Observer):
+        takes = frozenset({BodyChanged})
+
+        def on(self, event):
+            picture.on(event)
+
+    drawn = Drawn()
+    picture, body = Picture(drawn), make_body(1.0, np.zeros(3), np.diag((1.0, 2.0, 2.5)))
+    start = np.array((0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 0.1, 2.0, 0.1))
+    simulation = Simulation(flight_setup(body, integrator="auto", initial=start), ToPicture())
+    simulation.announce()
+    momentum = simulation.angular_momentum
+    for second, rotor in ((0, {}), (1, {"rotor_torque": (0.0, 0.5, 0.2)}), (3, {"rotor_torque": (0.0, 0.0, 0.0)})):
+        setup = changed(simulation.setup, **rotor)
+        simulation.submit(Change({}, lambda setup=setup: setup))
+        simulation.act()
+        for k in range(1, 9):
+            picture.draw(*drawable(simulation.advance(second * SECOND + k * SECOND // 8)))
+    plotted = np.array(list(drawn.parts[style.ANGULAR_MOMENTUM].values()))
+    assert len(plotted) == 24
+    assert np.abs(plotted[:, :3] - momentum).max() < 1e-8
+    assert np.abs(simulation.rotor_momentum).max() == 1.0
+    tips = drawn.parts[style.POINSOT_OMEGA]
+    assert [bool(len(tips[time_ns])) for time_ns in sorted(tips)] == 8 * [True] + 16 * [False]
+    assert not len(drawn.at_end(style.POINSOT_PLANE))
+
+
+def drawable(state):
+    return np.array([state.time_ns]), state.row[np.newaxis].copy()
 
 
 def test_the_ghost_is_compared_with_the_body_at_equal_times():

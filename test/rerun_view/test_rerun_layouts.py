@@ -61,6 +61,11 @@ def test_a_finished_recording_has_no_view_that_shows_nothing() -> None:
     assert "/" not in shown  # the log of commands
 
 
+def test_poinsots_construction_has_a_view_only_where_it_holds() -> None:
+    for subject, shown in ((Subject(), True), (Subject(rotor=True), False), (Subject(ghost=True, rotor=True), False)):
+        assert (f"/{style.POINSOT}" in [f"/{view.origin}".replace("//", "/") for view in views(subject)]) == shown
+
+
 @pytest.mark.parametrize("mesh", [True, False])
 def test_a_body_without_a_mesh_is_seen_as_its_box_of_equal_inertia(mesh: bool) -> None:
     (motion,) = (view for view in views(FlightTraits(mesh=mesh)) if view.name == "Motion")

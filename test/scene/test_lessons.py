@@ -221,6 +221,37 @@ def test_the_handle_turns_over_as_it_does_nowhere_without_the_term_and_gains_ene
     assert math.isclose(short_steps.energy[-1] / short_steps.energy[0], 1.04, abs_tol=0.001)
 
 
+def test_a_wheel_beyond_the_limit_keeps_the_satellite_on_its_middle_axis_and_half_of_it_does_not() -> None:
+    bare = fly("flywheel", 20.0)
+    assert np.allclose(bare.flips(axis=1), [3.0, 7.7, 12.5, 17.2], atol=0.06)
+    a, b, c = bare.body.principal_moments
+    assert (c - b) * 6.0 == pytest.approx(0.0064, abs=5e-5)
+    assert (b - a) * 6.0 == pytest.approx(0.0187, abs=5e-5)
+
+    def tipped(h: float) -> float:
+        flight = fly("flywheel", 20.0, rotor__momentum=[0.0, h, 0.0])
+        assert degrees_between(flight.momentum, flight.momentum[0]).max() < 1e-5
+        return float(np.degrees(np.arccos(np.clip(flight.momentum_about(1), -1.0, 1.0))).max())
+
+    assert tipped(0.01) == pytest.approx(3.8, abs=0.1)
+    assert tipped(0.003) == pytest.approx(89.4, abs=0.2)
+    assert tipped(-0.01) == pytest.approx(104.8, abs=0.2)
+    assert tipped(-0.02) == pytest.approx(13.5, abs=0.2)
+    assert tipped(0.0058) > 25.0 > 20.0 > tipped(0.0065)  # on either side of the limit
+
+
+def test_a_motor_turns_a_satellite_at_rest_back_against_its_wheel() -> None:
+    rest = {"initial__angular_velocity": [0.0, 0.0, 0.0], "rotor__torque": [0.0, 0.002, 0.0]}
+    flight = fly("flywheel", 2.0, **rest)
+    assert np.abs(flight.momentum).max() < 1e-15
+    assert flight.spin[-1] == pytest.approx([0.0, -0.004 / flight.body.principal_moments[1], 0.0], abs=1e-9)
+    assert flight.spin[-1, 1] == pytest.approx(-0.62, abs=0.005)
+    spun_up = fly("flywheel", 20.0, script="wheel_spun_up")
+    assert degrees_between(spun_up.momentum, spun_up.momentum[0]).max() < 1e-5
+    assert spun_up.spin[spun_up.at(1.0), 1] == pytest.approx(4.45, abs=0.01)
+    assert len(spun_up.flips(axis=1)) == 0
+
+
 def test_omega_wanders_round_l_in_a_plane_while_l_stays() -> None:
     flight = fly("poinsot", 12.0)
     assert np.allclose(flight.flips(axis=0), [1.0, 3.8, 6.6, 9.4], atol=0.06)

@@ -15,7 +15,7 @@ from rigid_proto_ros.scene.scenario import make_scenario, read_scene
 from rigid_proto_ros.scene.scenario_run import OfflineRun
 from rigid_proto_ros.scene.scene_file import read_scene_text
 from rigid_proto_ros.scene.script import parse_script, read_script
-from rigid_proto_ros.session.as_script import branch_at
+from rigid_proto_ros.session.as_script import branch_at, recorded_branch
 from rigid_proto_ros.session.bag import read_runs
 from rigid_proto_ros.session.messages import PROJECTIONS
 from rigid_proto_ros.session.recorded_session import RecordedSession, StateRows, resimulation
@@ -162,6 +162,38 @@ def test_a_branch_goes_on_under_every_kind_of_command(integrator, tolerance):
         # A free end that is on its way arrives when it would have, though not as evenly.
         if tied is None or tied.end_ns <= cut_ns:
             assert_goes_on(session, cut_ns, tolerance)
+
+
+WHEELS = """
+- {t: 0.2, set: {rotor.torque: [0.0, 0.0, 2.0e-3]}}
+- {t: 0.5, set: {gravity: [0.0, 0.0, -0.5]}}
+- {t: 0.7, set: {rotor.torque: [0.0, 0.0, 0.0]}}
+- {t: 0.9, set: {rotor.momentum: [1.0e-3, 0.0, 0.0], rotor.torque: [0.0, 1.0e-3, 0.0]}}
+- {t: 1.2, set: {scale: 1.1, ballast.nut: [0.02, 0.0, 0.0, 0.07]}}
+"""
+
+
+def test_a_branch_goes_on_with_the_flywheel_as_it_turns_then():
+    session = flown({"rotor.momentum": [0.0, 5e-4, 0.0]}, 2 * SECOND, WHEELS)
+    expected = {0.1: (0.0, 5e-4, 0.0), 0.6: (0.0, 5e-4, 8e-4), 0.8: (0.0, 5e-4, 1e-3), 1.5: (1e-3, 6e-4, 0.0)}
+    for cut_s, momentum in expected.items():
+        cut_ns = round(cut_s * SECOND)
+        branch = branched(session, cut_ns)
+        assert branch.scenario.parameters.rotor.momentum == pytest.approx(momentum, rel=1e-14)
+        assert branch.simulation.rotor_momentum == pytest.approx(momentum, rel=1e-14)
+        assert_goes_on(session, cut_ns, 1e-8)
+    whole = OfflineRun(make_scenario(read_scene_text(session.scene).values), parse_script(WHEELS))
+    whole.advance(2 * SECOND)
+    assert whole.simulation.state.row.tolist() == session.rows[-1].tolist()
+
+
+def test_a_branch_of_states_alone_has_the_flywheel_that_its_scene_drives():
+    scenario = make_scenario({**FEATURES, "rotor.momentum": [0.0, 5e-4, 0.0], "rotor.torque": [0.0, 0.0, 1e-3]})
+    run = OfflineRun(scenario)
+    run.advance(SECOND)
+    states = StateRows(np.array([SECOND]), run.simulation.state.row[None].copy())
+    branch, _ = recorded_branch(RecordedSession(scene="", events=[], states=states), scenario, SECOND)
+    assert read_scene_text(branch.scene).values["rotor.momentum"] == pytest.approx([0.0, 5e-4, 1e-3], rel=1e-14)
 
 
 def test_a_push_goes_on_along_the_normal_of_a_mesh_that_was_changed_for_another_one():

@@ -168,6 +168,7 @@ EVERYTHING = {
     "gravity": [0.5, -0.7, -9.81],
     "linear_damping": 0.02,
     "angular_damping": 1e-5,
+    "rotor": {"momentum": [1e-3, -2e-3, 3e-3], "torque": [-1e-2, 2e-2, 1e-2]},
     "initial": {
         "position": [0.1, 0.2, -0.3],
         "orientation_xyzw": [0.1, -0.2, 0.3, 0.9],

@@ -6,13 +6,13 @@
 | no motion and no load | none: the body sleeps |
 | no spin, no torque | closed form |
 | spin, no torque, no body-fixed force | one exact step of any length |
-| a body-fixed wrench, damping | Taylor series of the spin and of the quantities that follow from it |
+| a body-fixed wrench, damping, a flywheel | Taylor series of the spin and of the quantities that follow from it |
 | loads that depend on the attitude, a string | Taylor series of the whole motion |
 
 Taylor steps are as long as the accuracy allows, which follows from their coefficients. The choice depends only on the
-segment's problem and initial state, and each step only on the state at its start. Strings and damping faster than
-FASTEST are refused (simulation/setup.py): they need steps below about 1.5/FASTEST, for which the simulation would be
-slower than real time.
+segment's problem and initial state, and each step only on the state at its start. Strings, damping and
+flywheels faster than FASTEST are refused (simulation/setup.py): they need steps below about 1.5/FASTEST, for which the
+simulation would be slower than real time.
 """
 
 from __future__ import annotations
@@ -25,15 +25,15 @@ import numpy as np
 from ...base.compilation import njit
 from ...base.rotation import exponential, multiply, normalize, rotate
 from ...base.vectors import FloatArray
-from ..loads import ANGULAR_DAMPING, NO_GYROSCOPIC_TERM, STRING
+from ..loads import ANGULAR_DAMPING, NO_GYROSCOPIC_TERM, ROTOR, STRING
 from ..problem import Variables, damping_functions, is_good, stretch
 from .free_body import free_body_steps
 from .integrator import ADAPTIVE, LOADS, NOTHING, ONE_STEP, Integrator, Method
 from .series_steps import series_steps
 
 FASTEST = 5e5
-"""Highest frequency of a string [rad/s] and rate of damping [1/s] that one core can simulate in real time: 3.3e5 steps
-per second, each of 2 to 3 µs.
+"""Highest frequency of a string or flywheel [rad/s] and rate of damping [1/s] that one core can simulate in real time:
+3.3e5 steps per second, each of 2 to 3 µs.
 """
 
 
@@ -72,6 +72,8 @@ def kind_of_segment(p: np.record, y: Variables) -> int:
     """Kind of a segment with problem p and initial variables y."""
     spins = _any(y, 4)
     turned = _any(p.torque_body) or p.has_world_torque or (spins and p.damping_angular != 0.0)
+    if p.has_rotor:
+        turned = turned or _any(p.rotor_torque) or (spins and p.gyroscopic != 0.0)
     translates = p.translates
     if p.has_string:
         accelerated = _any(p.acceleration_added) or _any(p.acceleration_body)
@@ -124,7 +126,7 @@ AUTO = Integrator(
     source="integrators/auto.py",
     limits="Selects a method for each segment; steps follow from ``accuracy``, not ``step``.",
     stability_limit=math.inf,
-    supports=LOADS | {ANGULAR_DAMPING, STRING, NO_GYROSCOPIC_TERM},
+    supports=LOADS | {ANGULAR_DAMPING, STRING, NO_GYROSCOPIC_TERM, ROTOR},
     kernel=None,
     ways=tuple(_BY_KIND[kind] for kind in range(len(_BY_KIND))),
 )

@@ -17,7 +17,7 @@ from ...base.compilation import copy_numbers, njit
 from ...base.rotation import matrix_elements, norm
 from ...base.vectors import FloatArray, Quaternion, Vector
 from ..loads import NO_GYROSCOPIC_TERM
-from ..problem import DISPLACEMENT, HAND_WORK, HEAT, SPIN, VELOCITY, Variables, accelerations, parts_of
+from ..problem import DISPLACEMENT, HAND_WORK, HEAT, SPIN, TIME, VELOCITY, Variables, accelerations, parts_of
 from .integrator import EVALUATED, Integrator, Kernel
 from .runge_kutta import ONE_STAGE, repeated
 
@@ -86,7 +86,7 @@ def _quaternion_near(matrix: _Matrix, q: Quaternion) -> Quaternion:
 def _moved(y: Variables, at: Variables, p: np.record, h: float, pulls: bool, out: Variables) -> None:
     """Write y + h f(at) into out, which may be ``at``; the attitude is advanced as a matrix."""
     q, w, d, u = parts_of(at)
-    turning, moving, work, heat = accelerations(q, w, d, u, p, pulls)
+    turning, moving, work, heat = accelerations(q, w, d, u, at[TIME], p, pulls)
     start, _, _, _ = parts_of(y)
     R = _orthonormal(_turned(_axes(start), _axes(q), w, h))
     out[0], out[1], out[2], out[3] = _quaternion_near(R, q)
@@ -95,6 +95,7 @@ def _moved(y: Variables, at: Variables, p: np.record, h: float, pulls: bool, out
         out[DISPLACEMENT + j] = y[DISPLACEMENT + j] + h * u[j]
         out[VELOCITY + j] = y[VELOCITY + j] + h * moving[j]
     out[HAND_WORK], out[HEAT] = y[HAND_WORK] + h * work, y[HEAT] + h * heat
+    out[TIME] = y[TIME] + h
 
 
 @njit(error_model="numpy", allocates=False)

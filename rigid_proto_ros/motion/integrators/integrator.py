@@ -12,12 +12,12 @@ from typing import Any
 
 import numpy as np
 
-from ..loads import ANGULAR_DAMPING, BODY_FORCE, BODY_TORQUE, STRING, WORLD_TORQUE
+from ..loads import ANGULAR_DAMPING, BODY_FORCE, BODY_TORQUE, ROTOR, STRING, WORLD_TORQUE
 from ..problem import Variables
 
 LOADS = frozenset({BODY_TORQUE, WORLD_TORQUE, BODY_FORCE})
 """Needs of wrenches and pokes. Gravity, world forces at the COM and linear damping have a closed form for all."""
-EVALUATED = LOADS | {STRING, ANGULAR_DAMPING}
+EVALUATED = LOADS | {STRING, ANGULAR_DAMPING, ROTOR}
 """Needs that integrators support which take all rates from ``accelerations`` (motion/problem.py)."""
 
 

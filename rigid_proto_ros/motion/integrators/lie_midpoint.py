@@ -10,10 +10,11 @@ R⁺Iω⁺ = R(Iω + h t), t the torque in the axes at the start of the step, is
 
     I(ω⁺ − ω) = h (t − ½h ω̄ × t − ω̄ × Iω̄):
 
-angular momentum changes by exactly h t and energy by h ω̄·t. Source: Simo and Wong, Int. J. Numer. Meth. Engng 31
-(1991) 19; Lewis and Simo, J. Nonlinear Sci. 4 (1994) 253; with the Cayley map, Austin, Krishnaprasad and Wang, J.
-Comput. Phys. 107 (1993) 105. A torque τ given in the body's axes at the mean attitude enters as t − ½h ω̄ × t = sτ −
-¼h²/(1 + s)(ω̄·τ) ω̄, s² = 1 + ¼h²|ω̄|².
+angular momentum changes by exactly h t and energy by h ω̄·t. With a flywheel's momentum, whose mean over the step is H̄,
+the total R(Iω + H) is balanced so: I(ω⁺ − ω) = h (t − ½h ω̄ × t − ω̄ × (Iω̄ + H̄)) − (H⁺ − H). Source: Simo and Wong,
+Int. J. Numer. Meth. Engng 31 (1991) 19; Lewis and Simo, J. Nonlinear Sci. 4 (1994) 253; with the Cayley map, Austin,
+Krishnaprasad and Wang, J. Comput. Phys. 107 (1993) 105. A torque τ given in the body's axes at the mean attitude enters
+as t − ½h ω̄ × t = sτ − ¼h²/(1 + s)(ω̄·τ) ω̄, s² = 1 + ¼h²|ω̄|².
 """
 
 from __future__ import annotations
@@ -25,8 +26,8 @@ import numpy as np
 from ...base.compilation import copy_numbers, local_numbers, njit
 from ...base.rotation import multiply, normalize, rotate
 from ...base.vectors import Quaternion, Vector
-from ..loads import ANGULAR_DAMPING
-from ..problem import VARIABLES, Variables, is_good, parts_of, torque
+from ..loads import ANGULAR_DAMPING, ROTOR
+from ..problem import TIME, VARIABLES, Variables, is_good, later, parts_of, rotor_momentum, torque
 from .integrator import LOADS, Integrator
 
 _MAX_ITERATIONS = 60
@@ -52,20 +53,28 @@ def _mean_torque(o: Vector, t: Vector, h: float) -> Vector:
 
 
 @njit(error_model="numpy", allocates=False, forceinline=True)
-def _change_of_momentum(q: Quaternion, o: Vector, p: np.record, h: float) -> Vector:
-    """I(ω⁺ − ω) for the mean spin o."""
+def _change_of_momentum(q: Quaternion, o: Vector, mean: Vector, p: np.record, h: float) -> Vector:
+    """I(ω⁺ − ω) for the mean spin o and the flywheel's mean momentum."""
     tx, ty, tz = _mean_torque(o, torque(_half_turned(q, o, h), o, p), h)
     A, B, C = p.moments[0], p.moments[1], p.moments[2]
     gx, gy, gz = (B - C) * o[1] * o[2], (C - A) * o[2] * o[0], (A - B) * o[0] * o[1]
+    if p.has_rotor:
+        a, b, c = mean
+        rate = p.rotor_torque
+        gx, gy, gz = (
+            gx + (o[2] * b - o[1] * c - rate[0]),
+            gy + (o[0] * c - o[2] * a - rate[1]),
+            gz + (o[1] * a - o[0] * b - rate[2]),
+        )
     return h * (tx + gx), h * (ty + gy), h * (tz + gz)
 
 
 @njit(error_model="numpy", allocates=False, forceinline=True)
-def _newton_correction(o: Vector, r: Vector, h: float, p: np.record) -> Vector:
+def _newton_correction(o: Vector, r: Vector, mean: Vector, h: float, p: np.record) -> Vector:
     """Newton correction δ: J δ = −r for the residual r of 2I(ω̄ − ω) − h(...) = 0.
 
-    J = 2I + h([ω̄]× I − [Iω̄]× + c): exact for the gyroscopic term and damping, whose torque is −c ω̄ in the axes of
-    the start, too.
+    J = 2I + h([ω̄]× I − [Iω̄ + H̄]× + c): exact for the gyroscopic term and damping, whose torque is −c ω̄ in the axes
+    of the start, too.
     """
     damping = h * p.damping_angular
     ox, oy, oz = o
@@ -75,6 +84,9 @@ def _newton_correction(o: Vector, r: Vector, h: float, p: np.record) -> Vector:
     j01, j02 = h * (C - B) * oz, h * (C - B) * oy
     j10, j12 = h * (A - C) * oz, h * (A - C) * ox
     j20, j21 = h * (B - A) * oy, h * (B - A) * ox
+    if p.has_rotor:
+        a, b, c = h * mean[0], h * mean[1], h * mean[2]
+        j01, j02, j10, j12, j20, j21 = j01 + c, j02 - b, j10 - c, j12 + a, j20 + b, j21 - a
     c00, c01, c02 = j11 * j22 - j12 * j21, j02 * j21 - j01 * j22, j01 * j12 - j02 * j11
     c10, c11, c12 = j12 * j20 - j10 * j22, j00 * j22 - j02 * j20, j02 * j10 - j00 * j12
     c20, c21, c22 = j10 * j21 - j11 * j20, j01 * j20 - j00 * j21, j00 * j11 - j01 * j10
@@ -92,12 +104,13 @@ def _step(y: Variables, p: np.record, h: float, out: Variables) -> bool:
     A, B, C = p.moments[0], p.moments[1], p.moments[2]
     q, w, _, _ = parts_of(y)
     wx, wy, wz = o = w
+    mean = rotor_momentum(y[TIME] + 0.5 * h, p)
     change = 0.0
     converged = False
     for _ in range(_MAX_ITERATIONS):
-        kx, ky, kz = _change_of_momentum(q, o, p, h)
+        kx, ky, kz = _change_of_momentum(q, o, mean, p, h)
         r = 2.0 * A * (o[0] - wx) - kx, 2.0 * B * (o[1] - wy) - ky, 2.0 * C * (o[2] - wz) - kz
-        ex, ey, ez = _newton_correction(o, r, h, p)
+        ex, ey, ez = _newton_correction(o, r, mean, h, p)
         o = o[0] + ex, o[1] + ey, o[2] + ez
         before, change = change, max(abs(ex), abs(ey), abs(ez))
         size = max(abs(o[0]), abs(o[1]), abs(o[2]))
@@ -107,7 +120,7 @@ def _step(y: Variables, p: np.record, h: float, out: Variables) -> bool:
         ):
             converged = True
             break
-    kx, ky, kz = _change_of_momentum(q, o, p, h)
+    kx, ky, kz = _change_of_momentum(q, o, mean, p, h)
     out[4], out[5], out[6] = wx + kx / A, wy + ky / B, wz + kz / C
     # The full Cayley rotation: q ⊗ (½hω̄, 1).
     turned = multiply(*q, 0.5 * h * o[0], 0.5 * h * o[1], 0.5 * h * o[2], 1.0)
@@ -117,9 +130,10 @@ def _step(y: Variables, p: np.record, h: float, out: Variables) -> bool:
         push = rotate(*_half_turned(q, o, h), own[0], own[1], own[2])
         for k in range(3):
             # Solution of v⁺ = v + h(a − c ½(v + v⁺)).
-            mean = (y[10 + k] + 0.5 * h * (push[k] + added[k])) / (1.0 + 0.5 * h * c)
-            out[7 + k] = y[7 + k] + h * mean
-            out[10 + k] = y[10 + k] + h * (push[k] + added[k] - c * mean)
+            average = (y[10 + k] + 0.5 * h * (push[k] + added[k])) / (1.0 + 0.5 * h * c)
+            out[7 + k] = y[7 + k] + h * average
+            out[10 + k] = y[10 + k] + h * (push[k] + added[k] - c * average)
+    out[TIME] = later(y[TIME], h)
     return converged
 
 
@@ -146,6 +160,6 @@ LIE_MIDPOINT = Integrator(
     source="Simo and Wong, Int. J. Numer. Meth. Engng 31 (1991) 19",
     limits="No string; conserves energy and momentum at any step it can solve; attitude error of order h².",
     stability_limit=1.0,
-    supports=LOADS | {ANGULAR_DAMPING},
+    supports=LOADS | {ANGULAR_DAMPING, ROTOR},
     kernel=lie_midpoint_steps,
 )

@@ -27,11 +27,13 @@ from ..problem import (
     HAND_WORK,
     HEAT,
     SPIN,
+    TIME,
     VARIABLES,
     VELOCITY,
     Variables,
     accelerations,
     is_good,
+    later,
     parts_of,
     stretch,
     tension_margin,
@@ -62,7 +64,7 @@ _RESOLUTION = 2.0**-49
 
 @njit(error_model="numpy", allocates=False, forceinline=True)
 def _rates(z: Packed, p: np.record, pulls: bool) -> Packed:
-    """Time derivatives of the variables z, four by four: q; ω and the hand's work; d and the damper's heat; u."""
+    """Time derivatives of the variables z, four by four: q; ω and the hand's work; d and the damper's heat; u, time."""
     qx, qy, qz, qw = number(z, 0), number(z, 1), number(z, 2), number(z, 3)
     wx, wy, wz = number(z, 4), number(z, 5), number(z, 6)
     d = number(z, 8), number(z, 9), number(z, 10)
@@ -75,8 +77,8 @@ def _rates(z: Packed, p: np.record, pulls: bool) -> Packed:
     )
     if p.translates or p.has_world_torque:
         qx, qy, qz, qw = normalize(qx, qy, qz, qw)
-    turning, moving, work, heat = accelerations((qx, qy, qz, qw), (wx, wy, wz), d, u, p, pulls)
-    return joined(turned, four(*turning, work), four(*u, heat), four(*moving, 0.0))
+    turning, moving, work, heat = accelerations((qx, qy, qz, qw), (wx, wy, wz), d, u, number(z, 15), p, pulls)
+    return joined(turned, four(*turning, work), four(*u, heat), four(*moving, 1.0))
 
 
 @njit(error_model="numpy", allocates=False, forceinline=True)
@@ -90,7 +92,7 @@ def tableau_step(
         four(y[0], y[1], y[2], y[3]),
         four(y[SPIN], y[SPIN + 1], y[SPIN + 2], y[HAND_WORK]),
         four(y[DISPLACEMENT], y[DISPLACEMENT + 1], y[DISPLACEMENT + 2], y[HEAT]),
-        four(y[VELOCITY], y[VELOCITY + 1], y[VELOCITY + 2], 0.0),
+        four(y[VELOCITY], y[VELOCITY + 1], y[VELOCITY + 2], y[TIME]),
     )
     total = filled(0.0, 16)
     for i in range(stages):
@@ -106,7 +108,7 @@ def tableau_step(
     out[SPIN], out[SPIN + 1], out[SPIN + 2] = number(end, 4), number(end, 5), number(end, 6)
     out[DISPLACEMENT], out[DISPLACEMENT + 1], out[DISPLACEMENT + 2] = number(end, 8), number(end, 9), number(end, 10)
     out[VELOCITY], out[VELOCITY + 1], out[VELOCITY + 2] = number(end, 12), number(end, 13), number(end, 14)
-    out[HAND_WORK], out[HEAT] = number(end, 7), number(end, 11)
+    out[HAND_WORK], out[HEAT], out[TIME] = number(end, 7), number(end, 11), number(end, 15)
 
 
 @njit(error_model="numpy", allocates=False, inline="always")
@@ -125,6 +127,7 @@ def repeated(step: Step, tableau: FloatArray, y: Variables, p: np.record, h: flo
             _step_on_string(step, tableau, here, p, h, k, there)
         else:
             step(here, p, h, True, tableau, k, there)
+        there[TIME] = later(here[TIME], h)
         if not is_good(there):
             n = done
             break
@@ -297,7 +300,7 @@ def _semi_implicit_step(
 ) -> None:
     """A ``Step``: velocities first, then positions with the new velocities, the attitude by the exponential map."""
     q, w, d, u = parts_of(y)
-    turning, moving, work, heat = accelerations(q, w, d, u, p, pulls)
+    turning, moving, work, heat = accelerations(q, w, d, u, y[TIME], p, pulls)
     for j in range(3):
         out[SPIN + j] = w[j] + h * turning[j]
         out[VELOCITY + j] = u[j] + h * moving[j]
@@ -305,6 +308,7 @@ def _semi_implicit_step(
     turn = exponential(h * out[SPIN], h * out[SPIN + 1], h * out[SPIN + 2])
     out[0], out[1], out[2], out[3] = normalize(*multiply(*q, *turn))
     out[HAND_WORK], out[HEAT] = y[HAND_WORK] + h * work, y[HEAT] + h * heat
+    out[TIME] = y[TIME] + h
 
 
 @njit(error_model="numpy", allocates=False)

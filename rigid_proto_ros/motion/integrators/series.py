@@ -5,7 +5,8 @@ The equations of motion are made of products, quotients and one square root, so 
 before it by Cauchy products. There are two recurrences. ``spin_series`` is for loads that rotate with the body: Euler's
 equations, q' = ½ q ⊗ ω and u' = R g_b + a are polynomial. ``motion_series`` is for all others and for a string: R from
 the products of q, the knot's a = d + R r, its distance l from l² = a·a, its direction n from n l = a, the tension T =
-k(l − rest) + c l', the force −T n and its torque r × RᵀF. The first takes half of the second's time.
+k(l − rest) + c l', the force −T n and its torque r × RᵀF. The first takes half of the second's time. The momentum of
+a flywheel has two coefficients, h₀ and h', so that of ω × h is ωₖ × h₀ + ωₖ₋₁ × h'.
 
 Numbers are processed four at a time (base/simd.py): a vector's three components and one that only q uses. Source: Jorba
 and Zou, Experimental Mathematics 14 (2005) 99, section 2; Moore, Methods and Applications of Interval Analysis (1979),
@@ -36,8 +37,20 @@ from ...base.simd import (
     triple,
 )
 from ...base.vectors import FloatArray
-from ..loads import ANGULAR_DAMPING, BODY_FORCE, BODY_TORQUE
-from ..problem import DISPLACEMENT, HAND_WORK, HEAT, SPIN, VARIABLES, VELOCITY, Variables, is_good
+from ..loads import ANGULAR_DAMPING, BODY_FORCE, BODY_TORQUE, ROTOR
+from ..problem import (
+    DISPLACEMENT,
+    HAND_WORK,
+    HEAT,
+    SPIN,
+    TIME,
+    VARIABLES,
+    VELOCITY,
+    Variables,
+    is_good,
+    later,
+    rotor_momentum,
+)
 from ..string import NO_DIRECTION
 from .integrator import Integrator
 
@@ -86,6 +99,18 @@ def power_sum(c: FloatArray, at: int, columns: int, degree: int, h: float, like:
     return load(c, at, like) + ((a * fourth + e * square) + (b + f * square) * h)
 
 
+@njit(error_model="numpy", allocates=False)
+def _cross(a: Packed, b: Packed) -> Packed:
+    return arranged(a, (1, 2, 0, 3)) * arranged(b, (2, 0, 1, 3)) - arranged(a, (2, 0, 1, 3)) * arranged(b, (1, 2, 0, 3))
+
+
+@njit(error_model="numpy", allocates=False)
+def _rotor_at(y: Variables, p: np.record) -> tuple[Packed, Packed]:
+    """The flywheel's momentum at the variables y and its rate, as the gyroscopic term has them."""
+    a, b, c = rotor_momentum(y[TIME], p)
+    return four(a, b, c, 0.0) * p.gyroscopic, triple(p.rotor_torque, 0, 0.0) * p.gyroscopic
+
+
 # Loads that rotate with the body
 
 # Layout of a coefficient's row: parts of four numbers each, of which only q uses the fourth. Two parts fill a cache
@@ -102,7 +127,7 @@ VARIABLES_AT = _Q
 @njit(error_model="numpy", allocates=False)
 def spin_series(y: Variables, p: np.record, degree: int, c: FloatArray) -> None:
     """Coefficients c (degree + 1, SPIN_COLUMNS) of the motion from variables y: q, ω, d, u."""
-    translates = p.translates
+    translates, has_rotor = p.translates, p.has_rotor
     moments = triple(p.moments, 0, 1.0)
     gyroscopic = (arranged(moments, (1, 2, 0, 3)) - arranged(moments, (2, 0, 1, 3))) / moments
     gyroscopic = gyroscopic * p.gyroscopic
@@ -114,8 +139,15 @@ def spin_series(y: Variables, p: np.record, degree: int, c: FloatArray) -> None:
     turning, pushing = triple(p.torque_body, 0, 0.0) / moments, triple(p.acceleration_added, 0, 0.0)
     q0, (qx0, qy0, qz0), (wx0, wy0, wz0) = q, _axes(q), _spread(w)
     yzx0, zxy0 = gyroscopic * arranged(w, (1, 2, 0, 3)), gyroscopic * arranged(w, (2, 0, 1, 3))
+    rotor = rotor_rate = w_before = zeros
+    if has_rotor:
+        rotor, rotor_rate = _rotor_at(y, p)
+        turning = turning - triple(p.rotor_torque, 0, 0.0) / moments
     row = 0
     for k in range(degree):
+        if has_rotor:
+            turning = turning - (_cross(w, rotor) + _cross(w_before, rotor_rate)) / moments
+            w_before = w
         qx, qy, qz = _axes(q)
         wx, wy, wz = _spread(w)
         yzx, zxy = arranged(w, (1, 2, 0, 3)), arranged(w, (2, 0, 1, 3))
@@ -210,6 +242,7 @@ def taylor_steps_of_degree(y: Variables, p: np.record, h: float, n: int, degree:
     for done in range(n):
         spin_series(here, p, degree, c)
         spin_at(c, degree, h, there)
+        there[TIME] = later(here[TIME], h)
         if not is_good(there):
             n = done
             break
@@ -232,7 +265,7 @@ TAYLOR = Integrator(
     source="Jorba and Zou, Experimental Mathematics 14 (2005) 99",
     limits="For a constant wrench in body axes, no world torque, no string; diverges beyond |ω|h of about 2.",
     stability_limit=1.0,
-    supports=frozenset({BODY_TORQUE, BODY_FORCE, ANGULAR_DAMPING}),
+    supports=frozenset({BODY_TORQUE, BODY_FORCE, ANGULAR_DAMPING, ROTOR}),
     kernel=taylor_steps,
 )
 
@@ -259,11 +292,6 @@ def _dot(a: Packed, b: Packed) -> float:
     """Scalar product of the first three components."""
     ab = a * b
     return float(number(ab, 0) + number(ab, 1) + number(ab, 2))
-
-
-@njit(error_model="numpy", allocates=False)
-def _cross(a: Packed, b: Packed) -> Packed:
-    return arranged(a, (1, 2, 0, 3)) * arranged(b, (2, 0, 1, 3)) - arranged(a, (2, 0, 1, 3)) * arranged(b, (1, 2, 0, 3))
 
 
 @njit(error_model="numpy", allocates=False)
@@ -367,7 +395,7 @@ def motion_series(  # noqa: C901 - the recurrences of one order, in their order;
     """Fill c with the coefficients of the motion from variables y up to ``degree``. knot: that of the string, if one is
     tied; taut: whether its law of tension holds.
     """
-    tied, turned = p.has_string, p.has_world_torque
+    tied, turned, has_rotor = p.has_string, p.has_world_torque, p.has_rotor
     moments = four(p.moments[0], p.moments[1], p.moments[2], 1.0)
     inverse_moments = filled(1.0, 4) / moments
     gyroscopic = (arranged(moments, (1, 2, 0, 3)) - arranged(moments, (2, 0, 1, 3))) * p.gyroscopic
@@ -397,6 +425,9 @@ def motion_series(  # noqa: C901 - the recurrences of one order, in their order;
     swing0 = _cross(w, arm)
     # n·R (ω × r) = ω·lever: the only term through which tension and spin depend on each other.
     lever = _cross(arm, _weighed(row1, row2, row3, along0))
+    rotor = rotor_rate = w_before = zeros
+    if has_rotor:
+        rotor, rotor_rate = _rotor_at(y, p)
     for k in range(degree):
         at, f = k * MOTION_COLUMNS, 1.0 / (k + 1.0)
         # Sums of products of earlier coefficients first: they don't depend on those computed in this iteration.
@@ -424,6 +455,11 @@ def motion_series(  # noqa: C901 - the recurrences of one order, in their order;
             torque, push = torque + triple(p.torque_body, 0, 0.0), push + triple(p.acceleration_added, 0, 0.0)
         if turned:
             torque = torque + _turned_by_the_world(p, r1, r2, r3)
+        if has_rotor:
+            torque = torque - (_cross(w, rotor) + _cross(w_before, rotor_rate))
+            w_before = w
+            if k == 0:
+                torque = torque - triple(p.rotor_torque, 0, 0.0)
         next_d, next_a, next_length, work = u * f, zeros, 0.0, 0.0
         if tied:
             # The knot's velocity is u + R (ω × r).
@@ -487,6 +523,7 @@ def motion_at(c: FloatArray, p: np.record, degree: int, h: float, y: Variables) 
     for j in range(columns):
         y[j] += h * changes[j]
     y[0], y[1], y[2], y[3] = normalize(y[0], y[1], y[2], y[3])
+    y[TIME] += h
 
 
 @njit(error_model="numpy", allocates=False)

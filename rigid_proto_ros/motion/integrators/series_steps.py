@@ -28,7 +28,7 @@ from ...base.compilation import copy_numbers, njit
 from ...base.rotation import norm
 from ...base.simd import Packed, filled, four, joined, largest, load
 from ...base.vectors import FloatArray
-from ..problem import ATTITUDE, HEAT, VARIABLES, Variables, damping_functions, is_good
+from ..problem import ATTITUDE, HEAT, TIME, VARIABLES, Variables, damping_functions, is_good
 from ..string import most_yielding
 from .series import (
     A_KNOT,
@@ -412,6 +412,7 @@ def _accept(y: Variables, p: np.record, control: np.record, following: Variables
             return False
         copy_numbers(y, following)
         _reach(p, control, c, length, following)
+        following[TIME] = (elapsed + length) * 1e-9
         good = is_good(following)
         # Velocity errors are also weighted by velocities at the end, which matters if these decrease within the step.
         weights, more = heavier(scales(following, p, (elapsed + length) * 1e-9), weights)
