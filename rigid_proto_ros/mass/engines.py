@@ -85,7 +85,7 @@ FPhysicsCommand::ExecuteWrite(component->GetBodyInstance()->ActorHandle, [](FPhy
         per_m=100.0,
     ),
     "godot": Form(
-        "Godot 4 (a RigidBody3D: its inspector, or _init of its script)",
+        "Godot 4 (_ready of a RigidBody3D's script; the inspector rounds to 0.01)",
         """\
 mass = {mass}
 center_of_mass_mode = RigidBody3D.CENTER_OF_MASS_MODE_CUSTOM
