@@ -8,10 +8,10 @@ import type { Snapshot, Vec3 } from "./source.ts";
 import { words } from "./words.ts";
 import { short } from "./words_numbers.ts";
 
-/** [degrees] What an error that has grown so large can be seen by. */
+/** [degrees] Sensitivity above which the motion is reported as chaotic. */
 const CHAOS = 1;
 
-/** Directions that an angle can be measured between, in the world. */
+/** A direction of the protractor by its name, in world axes. */
 export function direction(thing: string, now: Snapshot, axes: readonly number[], first: Vec3 | null): Vec3 | null {
   const { rotation: R, omega, momentum, row } = now.body, axis = { one: 0, two: 1, three: 2 }[thing];
   if (axis !== undefined) {
@@ -21,7 +21,7 @@ export function direction(thing: string, now: Snapshot, axes: readonly number[],
   return thing === "omega" ? omega : thing === "momentum" ? momentum : thing === "velocity" ? [row[7]!, row[8]!, row[9]!] : thing === "start" ? first : [0, 0, 1];
 }
 
-/** Protractor, stopwatch, a point's trace and numbers. */
+/** The card with protractor, stopwatch, a point's trace and numbers. */
 export function measureCard(desk: Desk): Card {
   const { motion, look } = desk, w = words.measure, things = Object.entries(w.things);
   const angle = make("b", {}, "–");
@@ -104,7 +104,7 @@ export function measureCard(desk: Desk): Card {
   };
 }
 
-/** [degrees], accurate near 0 and 180. */
+/** Angle between vectors [degrees], accurate near 0 and 180. */
 function between(a: Vec3, b: Vec3): number {
   const cross = Math.hypot(a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]);
   return (Math.atan2(cross, a[0] * b[0] + a[1] * b[1] + a[2] * b[2]) * 180) / Math.PI;

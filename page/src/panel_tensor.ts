@@ -6,13 +6,13 @@ import { hasFlywheel } from "./poinsot.ts";
 import { words } from "./words.ts";
 import { short } from "./words_numbers.ts";
 
-/** Of the largest moment: a product that is smaller is what numbers leave. */
+/** Product of inertia, relative to the largest moment, below which it is shown as 0. */
 const VANISHED = 2e-5;
 const UNTURNED = [1, 0, 0, 0, 1, 0, 0, 0, 1] as const;
 
 type Matrix = readonly number[];
 
-/** The nine numbers in axes that one turns by hand, and shapes that stand for them. */
+/** The card with the tensor's nine numbers in axes that the user turns, and shapes that represent the tensor. */
 export function tensorCard(desk: Desk): Card {
   const { motion, look } = desk, w = words.inertia;
   let base: Matrix = UNTURNED;
@@ -71,13 +71,13 @@ function times(a: Matrix, b: Matrix): Matrix {
 
 function transposed(a: Matrix): Matrix { return [0, 3, 6, 1, 4, 7, 2, 5, 8].map((k) => a[k]!); }
 
-/** About x, then y, then z, each an axis as turned so far. */
+/** Matrix of successive rotations about x, y and z, each about the axis as rotated so far. */
 function rotation(angles: readonly number[]): Matrix {
   const [a, b, c] = angles.map((angle) => [Math.cos(angle), Math.sin(angle)] as const) as [readonly [number, number], readonly [number, number], readonly [number, number]];
   return times(times([1, 0, 0, 0, a[0], -a[1], 0, a[1], a[0]], [b[0], 0, b[1], 0, 1, 0, -b[1], 0, b[0]]), [c[0], -c[1], 0, c[1], c[0], 0, 0, 0, 1]);
 }
 
-/** The same axes with the third along the cross product of the others. */
+/** The axes made right-handed by the sign of the third one. */
 function rightHanded(axes: Matrix): Matrix {
   const [a, b, c, d, e, f, g, h, i] = axes as unknown as [number, number, number, number, number, number, number, number, number];
   const sign = a * (e * i - f * h) - b * (d * i - f * g) + c * (d * h - e * g) < 0 ? -1 : 1;

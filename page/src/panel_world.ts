@@ -4,7 +4,7 @@ import type { Card, Desk } from "./panel.ts";
 import { button, check, choice, make, numberField } from "./panel_elements.ts";
 import { words } from "./words.ts";
 
-/** Gravity, damping, the law of motion and the spin at the start. */
+/** The card with gravity, damping, the law of motion and the initial angular velocity. */
 export function worldCard(desk: Desk): Card {
   const { motion } = desk, w = words.world, set = (name: string) => (value: number): string | null => motion.set({ [name]: value });
   const places = make("div", { class: "row", role: "group", "aria-label": w.gravity });

@@ -46,7 +46,7 @@ function numberOf(name: string, value: Value, declared: Declarations): number {
   return Number(value);
 }
 
-/** Refusals of kernels, and their words. */
+/** The kernels' refusals as texts. */
 export class Refusals {
   readonly record: Refusal;
   readonly #kernels: Kernels;

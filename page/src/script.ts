@@ -153,7 +153,7 @@ export class Script {
     };
   }
 
-  /** Kind of place, its three numbers, and three of a ray's direction or zeros. */
+  /** Kind of a load's point, its three numbers, and a ray's direction or three zeros. */
   #place(at: unknown, contacts: Values): number[] {
     const { load } = NUMBERS;
     if (at === "com") return [load.AT_COM, ...ZERO, ...ZERO];

@@ -177,8 +177,8 @@ export interface Snapshot {
   readonly angleToGhost: number;
 }
 
-/** Where a ray first meets the body. mesh: [mesh]; body: [m, body axes]; world: [m]; distance: [m] from the ray's
- * origin; normal: outward, unit, world axes. */
+/** The first intersection of a ray with the body. mesh: [mesh]; body: [m, body axes]; world: [m]; distance: [m] from
+ * the ray's origin; normal: outward, unit, world axes. */
 export interface Hit {
   readonly mesh: Vec3;
   readonly body: Vec3;

@@ -154,7 +154,7 @@ export class Observed {
     return toWorld({ rotation: this.rotation([...row.subarray(3, 7)]), position: triple(row), com: triple(own, body.COM), scale: triple(own, body.BODY_SCALE) }, point);
   }
 
-  /** Where a ray [world] first meets the body. */
+  /** The first intersection of a ray [world] with the body. */
   firstHit(flown: Flown, origin: Vec3, direction: Vec3): Hit | null {
     const memory = this.#kernels.memory, { body } = NUMBERS, { placed } = { placed: this.#placed };
     const row = flown.flight.row, own = flown.flight.body, [from, way, found] = this.#three;
