@@ -43,6 +43,7 @@ DOCUMENTS = [
 PROGRAMS = (
     "cd colcon eval git make npm pip poke_client python rerun rigid_body_node rigid_proto ros2 rosdep source sudo uvx"
 )
+_IN_HEAD = re.compile(r'(rigid_(?:proto|body_node) (?:"[^"]*"|[^",\n])*?)(?:,|  +|\n|$)')
 _CALL = re.compile(rf"(\.venv/bin/|[A-Z]+=\S+ )?({PROGRAMS.replace(' ', '|')}) \S")
 
 INSTALLS = "installs into the machine or from a registry"
@@ -180,7 +181,7 @@ def shown() -> Iterator[str]:
         yield from re.findall(r"^#   (\S.*)$", example_path(name).read_text("utf-8"), re.MULTILINE)
     for path in sorted((SOURCE / "config").glob("**/*.yaml")):
         head = re.sub(r"\n# ?", " ", path.read_text("utf-8"))
-        yield from re.findall(r"(rigid_(?:proto|body_node) [^,\n]*?)(?:,|  +|\n|$)", head.partition("/**:")[0])
+        yield from _IN_HEAD.findall(head.partition("/**:")[0])
     for path in sorted((SOURCE / "msg_examples").glob("*.sh")):
         yield from re.findall(r"^ros2 .*$", path.read_text("utf-8"), re.MULTILINE)
     (hook,) = yaml.safe_load((SOURCE / ".pre-commit-hooks.yaml").read_text("utf-8"))
