@@ -43,6 +43,7 @@ DOCUMENTS = [
 PROGRAMS = (
     "cd colcon eval git make npm pip poke_client python rerun rigid_body_node rigid_proto ros2 rosdep source sudo uvx"
 )
+_IN_HEAD = re.compile(r'(rigid_(?:proto|body_node) (?:"[^"]*"|[^",\n])*?)(?:,|  +|\n|$)')
 _CALL = re.compile(rf"(\.venv/bin/|[A-Z]+=\S+ )?({PROGRAMS.replace(' ', '|')}) \S")
 
 INSTALLS = "installs into the machine or from a registry"
@@ -180,7 +181,7 @@ def shown() -> Iterator[str]:
         yield from re.findall(r"^#   (\S.*)$", example_path(name).read_text("utf-8"), re.MULTILINE)
     for path in sorted((SOURCE / "config").glob("**/*.yaml")):
         head = re.sub(r"\n# ?", " ", path.read_text("utf-8"))
-        yield from re.findall(r"(rigid_(?:proto|body_node) [^,\n]*?)(?:,|  +|\n|$)", head.partition("/**:")[0])
+        yield from _IN_HEAD.findall(head.partition("/**:")[0])
     for path in sorted((SOURCE / "msg_examples").glob("*.sh")):
         yield from re.findall(r"^ros2 .*$", path.read_text("utf-8"), re.MULTILINE)
     (hook,) = yaml.safe_load((SOURCE / ".pre-commit-hooks.yaml").read_text("utf-8"))
@@ -257,6 +258,7 @@ def in_a_copy(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
         (tmp_path / name).symlink_to(SOURCE / name)
     (tmp_path / "poke.yaml").symlink_to(example_path("flip_and_poke"))
     write_robot(tmp_path)
+    write_parts(tmp_path)
     monkeypatch.chdir(tmp_path)
     return tmp_path
 
@@ -277,6 +279,16 @@ def write_robot(folder: Path) -> None:
         place.mkdir(exist_ok=True)
         trimesh.creation.box((0.3, 0.2, 0.1)).export(place / "upper_arm.stl")
         (place / "robot.urdf").write_text(f"<robot name='r'>{links}{joint}</robot>")
+
+
+def write_parts(folder: Path) -> None:
+    """The reader's parts in millimetres, files of parts as docs/reference.md shows one, and an arm with a tool's link."""
+    for name, sides in (("body", (60, 40, 20)), ("cover", (60, 40, 4)), ("grip", (30, 30, 60))):
+        trimesh.creation.box(sides).export(folder / f"{name}.stl")
+    for example in [block for block in blocks(SOURCE / "docs" / "reference.md", "yaml") if "\nparts:" in block]:
+        for name in ("whole", "gripper"):
+            (folder / f"{name}.yaml").write_text(example)
+    (folder / "arm.urdf").write_text((folder / "robot.urdf").read_text().replace("'arm'", "'tool0'"))
 
 
 @pytest.mark.slow
