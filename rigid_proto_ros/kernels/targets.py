@@ -31,6 +31,8 @@ class Target:
     features: str = ""
     fuses: bool = True
     """Whether it has a fused multiply-add."""
+    inlining: int = -1
+    """LLVM's threshold for inlining; -1 is its default."""
 
 
 TARGETS = {
@@ -38,7 +40,10 @@ TARGETS = {
     "x86-64-v3": Target("x86_64-unknown-linux-gnu", "x86-64-v3"),
     "x86-64-v2": Target("x86_64-unknown-linux-gnu", "x86-64-v2", fuses=False),
     "aarch64": Target("aarch64-unknown-linux-gnu", "generic"),
-    "wasm32": Target("wasm32-unknown-unknown", "generic", "+simd128,+bulk-memory,+nontrapping-fptoint", fuses=False),
+    # Inlining less takes a tenth off the module, 11 kB off the compressed page, and no time was seen to be lost.
+    "wasm32": Target(
+        *("wasm32-unknown-unknown", "generic", "+simd128,+bulk-memory,+nontrapping-fptoint"), fuses=False, inlining=50
+    ),
 }
 LEVEL = 2
 """Of optimization, as in -O2."""
@@ -85,7 +90,9 @@ def object_code(whole: Any, target: Target) -> bytes:
     for variable in module.global_variables:
         if not variable.is_declaration:
             variable.linkage = "internal"
-    passes = llvm.create_pass_builder(machine, llvm.create_pipeline_tuning_options(speed_level=LEVEL))
+    options = llvm.create_pipeline_tuning_options(speed_level=LEVEL)
+    options.inlining_threshold = target.inlining
+    passes = llvm.create_pass_builder(machine, options)
     passes.getModulePassManager().run(module, passes)
     # Where loops have been unrolled it only now shows that a function never raises.
     again = llvm.create_new_module_pass_manager()

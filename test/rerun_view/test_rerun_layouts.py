@@ -62,7 +62,11 @@ def test_a_finished_recording_has_no_view_that_shows_nothing() -> None:
 
 
 def test_poinsots_construction_has_a_view_only_where_it_holds() -> None:
-    for subject, shown in ((FlightTraits(), True), (FlightTraits(rotor=True), False), (FlightTraits(ghost=True, rotor=True), False)):
+    for subject, shown in (
+        (FlightTraits(), True),
+        (FlightTraits(rotor=True), False),
+        (FlightTraits(ghost=True, rotor=True), False),
+    ):
         assert (f"/{style.POINSOT}" in [f"/{view.origin}".replace("//", "/") for view in views(subject)]) == shown
 
 
