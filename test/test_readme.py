@@ -100,6 +100,7 @@ def in_a_copy(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     for name in ("config", "msg_examples"):
         (tmp_path / name).symlink_to(SOURCE / name)
     write_robot(tmp_path)
+    write_parts(tmp_path)
     monkeypatch.chdir(tmp_path)
     return tmp_path
 
@@ -120,6 +121,18 @@ def write_robot(folder: Path) -> None:
         place.mkdir(exist_ok=True)
         trimesh.creation.box((0.3, 0.2, 0.1)).export(place / "upper_arm.stl")
         (place / "robot.urdf").write_text(f"<robot name='r'>{links}{joint}</robot>")
+
+
+def write_parts(folder: Path) -> None:
+    """The reader's parts in millimetres, the file of parts that docs/reference.md shows, and an arm with a tool's link."""
+    for name, sides in (("body", (60, 40, 20)), ("cover", (60, 40, 4)), ("grip", (30, 30, 60))):
+        trimesh.creation.box(sides).export(folder / f"{name}.stl")
+    text = (SOURCE / "docs" / "reference.md").read_text("utf-8")
+    (example,) = [block for block in re.findall(r"```yaml\n(.*?)```", text, re.DOTALL) if "\nparts:" in block]
+    for name in ("whole", "gripper"):
+        (folder / f"{name}.yaml").write_text(example)
+    robot = (folder / "robot.urdf").read_text().replace("'arm'", "'tool0'")
+    (folder / "arm.urdf").write_text(robot)
 
 
 def test_every_command_is_of_a_kind_that_some_test_looks_at() -> None:
