@@ -43,6 +43,7 @@ SHOWN = """() => {
 
 PLAIN = {
     "kg",
+    "mm",
     "rad",
     "rpm",
     "Lx",
