@@ -11,6 +11,7 @@ export interface Words {
   readonly scale: string;
   readonly mass: string;
   readonly walls: string;
+  readonly parts: string;
   readonly orientation: string;
   readonly rate: readonly string[];
   readonly magnitude: readonly string[];

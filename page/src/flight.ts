@@ -95,7 +95,8 @@ export class Flown {
       const model = this.#refusals.record.detail;
       const provided = this.#refusals.code === refusal.NO_MOMENTS && placed.surface !== null
         && this.#surfaces.provide(placed.record, placed.surface, model, this.#newScene.scale);
-      if (!provided) throw new Refused(this.#refusals.words(values));
+      const hasParts = placed.surface?.volume !== undefined && this.#declared.models[model] === "walled";
+      if (!provided) throw new Refused(hasParts ? this.#declared.words.parts : this.#refusals.words(values));
     }
   }
 

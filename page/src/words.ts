@@ -52,7 +52,7 @@ export const english = {
     units: [["", "as it seems"], ["1", "1 m"], ["0.01", "1 cm"], ["0.001", "1 mm"], ["0.0254", "1 inch"]] as const,
     sound: "Closed, and wound alike. Whether it crosses itself isn't judged here.", tooLarge: "The file is larger than 50 MB",
     mass: "Mass", fixed: "mass", dense: "density", model: "Where the mass is",
-    models: { solid: "all through (true)", shell: "in the skin", points: "in the corners", bounding_box: "in the bounding box", walled: "in walls and infill (printed)", explicit: "numbers of its own" } as Record<string, string>,
+    models: { solid: "all through (true)", shell: "in the skin", points: "in the corners", bounding_box: "in the bounding box", walled: "in walls (printed)", explicit: "numbers of its own" } as Record<string, string>,
     table: "Moments [kg m²]", beside: "beside the truth", ballast: "Ballast", add: "stick on",
     addTitle: "Then press the place of the body", press: "Press the place on the body", remove: "remove", none: "none",
     walls: "wall thickness", infill: "infill",

@@ -3,7 +3,8 @@
 // node asked.ts KERNELS.wasm DATA < JSON: answers to what a test in Python asks, as JSON.
 // {"refusals": [[values, entry], ..]}: what the page says of an entry at time 0 of a scene, or of the scene.
 // {"bodies": [[values, null or {name, text} of a mesh file], ..]}: what engines take of it, by their names.
-// {"numbers": [x, ..]}: how it writes numbers. {"take": text, "untilNs": t}: the state's hash then.
+// {"numbers": [x, ..]}: how it writes numbers. {"take": text, "untilNs": t}: the state's hash then; with
+// an "entry" also what is said of that.
 
 import { readFileSync } from "node:fs";
 import { Data } from "../src/data.ts";
@@ -21,6 +22,7 @@ interface Asked {
   readonly numbers?: readonly number[];
   readonly take?: string;
   readonly untilNs?: number;
+  readonly entry?: Entry;
 }
 const asked = JSON.parse(readFileSync(0, "utf8")) as Asked;
 const ghost: GhostChoice = { inertia_model: "", integrator: "", step: 0, gyroscopic: true };
@@ -51,6 +53,7 @@ if (asked.take !== undefined) {
   const motion = await openMotion(kernels, data, new TextEncoder().encode(asked.take));
   motion.advance(asked.untilNs ?? 0);
   answer["hash"] = await motion.hash();
+  if (asked.entry !== undefined) answer["refused"] = motion.submit(asked.entry);
   answer["findings"] = motion.body().findings.map((each) => each.code);
   const { scene, script, mesh } = motion.take();
   answer["files"] = { scene, script, mesh: mesh === null ? null : { name: mesh.name, text: new TextDecoder().decode(mesh.bytes) } };

@@ -17,7 +17,7 @@ from . import MODEL_COMS
 from .closed_form import given_mass, is_plainly_good, printed_moments, spread_mass
 from .moments import MODELS, STRETCHED, Moments, mesh_moments
 from .tensor import check_tensor, tensor_from_six
-from .walls import LIMIT, refused_walls, walls_of_surface
+from .walls import LIMIT, refused_walls, walls_of_parts, walls_of_surface
 
 SCALE_LIMITS = (1e-9, 1e9)
 Surface = tuple[Points, Triangles]
@@ -127,7 +127,7 @@ class MeshMoments:
         MeshError where there is none.
         """
         if self.summed is not None:
-            raise InputError("inertia_model", "walled", "wall_thickness of each part, in the file of parts")
+            raise walls_of_parts()
         stretch = np.abs(scale_vector(scale))
         stretch = stretch / stretch[0]
         key = tuple(stretch.tolist())

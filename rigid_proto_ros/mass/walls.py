@@ -233,6 +233,11 @@ def rounded_down(value: float) -> float:
     return float(Context(prec=3, rounding=ROUND_DOWN).create_decimal_from_float(value))
 
 
+def walls_of_parts() -> InputError:
+    """The error that says that parts have walls of their own."""
+    return InputError("inertia_model", "walled", "wall_thickness of each part, in the file of parts")
+
+
 def refused_walls(thickness: float, largest: float, error: float) -> InputError:
     """The error that says that walls are too thick."""
     accepted = f"at most {rounded_down(largest):g} m for this body and infill, where the error of the first order is"

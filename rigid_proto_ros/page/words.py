@@ -17,7 +17,7 @@ from ..base.errors import InputError, TensorError
 from ..mass.properties import scale_vector
 from ..mass.tensor import check_tensor
 from ..mass.verdict import check_surface
-from ..mass.walls import refused_walls
+from ..mass.walls import refused_walls, walls_of_parts
 from ..motion.frames import Frame
 from ..motion.integrators import INTEGRATORS, check_supported
 from ..motion.loads import MISSED, NEEDS, NO_MESH, NO_MESH_NORMAL, NO_NORMAL, NO_VERTEX, unresolved
@@ -37,6 +37,7 @@ def words() -> dict[str, Any]:
         "scale": _raised(lambda: scale_vector([0.0])).replace("[0.0]", "{0}"),
         "mass": _form(InputError("mass", _NUMBERS[0], "density * volume within 1e-300 .. 1e300 kg")),
         "walls": _form(refused_walls(*_NUMBERS)).replace("2.34e+22", "{1:down3}"),
+        "parts": str(walls_of_parts()),
         "orientation": _form(
             InputError("initial.orientation_xyzw", "{0}", "four finite numbers x, y, z, w, not all zero")
         ).replace("'{0}'", "{0}"),

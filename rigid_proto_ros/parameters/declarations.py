@@ -311,7 +311,8 @@ class Parameters:
 
     mesh: str = declare(
         "t_handle",
-        "Mesh of the body: a path, a package:// URI or a bundled name; empty only with the explicit inertia model.",
+        "Mesh of the body, or a YAML file of parts: a path, a package:// URI or a bundled name; empty only with the "
+        "explicit inertia model.",
     )
     mesh_repair: bool = declare(False, "Orient, weld and cap a mesh that isn't closed, as inspect --repair does.")
     mesh_fallback: str = declare(

@@ -44,6 +44,7 @@ SHOWN = """() => {
 
 PLAIN = {
     "kg",
+    "mm",
     "rad",
     "rpm",
     "Lx",

@@ -103,6 +103,15 @@ def test_refusals_have_the_words_of_python(page_file: Path) -> None:
 
 
 @pytest.mark.slow
+def test_a_body_of_parts_is_refused_as_one_printed_part(page_file: Path, tmp_path: Path) -> None:
+    (tmp_path / "whole.yaml").write_text("parts: {a: {mesh: hammer, density: 500}, b: {mesh: book, mass: 1}}")
+    values = {"mesh": str(tmp_path / "whole.yaml")}
+    entry = {"set": {"inertia_model": "walled"}}
+    told = answered(page_file, take=json.dumps(take_of(values)), untilNs=0, entry=entry)
+    assert told["refused"] == refused_by_python(values, entry)
+
+
+@pytest.mark.slow
 def test_numbers_are_written_as_python_writes_them(page_file: Path) -> None:
     rng = np.random.default_rng(1)
     several = [*(10.0 ** rng.uniform(-310, 308, 500) * rng.choice([-1, 1], 500)), *rng.normal(0.0, 10.0, 500)]
