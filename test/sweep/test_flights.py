@@ -1,6 +1,7 @@
 # SPDX-License-Identifier: MIT
 """Flights from Python: commanded, stepped and recorded as scripts and the node do it, one by one and on all cores."""
 
+import re
 from pathlib import Path
 
 import numpy as np
@@ -284,3 +285,19 @@ def test_each_run_of_a_flight_that_is_reset_is_recorded_and_verified(tmp_path) -
                 flight.reset(load_scene("t_handle", {"mass": 0.1 + number}))
     assert [len(run.times) for run in read_runs(path)] == [51, 51, 51]
     assert main(["replay", str(path), "--verify"]) == 0
+
+
+@pytest.mark.parametrize("number", range(3))
+def test_what_the_document_shows_runs_as_it_stands(tmp_path, monkeypatch, capsys, number) -> None:
+    pytest.importorskip("mcap")
+    document = Path(__file__).parents[2] / "docs" / "python.md"
+    if not document.is_file():
+        pytest.skip("the documents are in a source tree")
+    shown = re.findall(r"^```python\n(.*?)^```", document.read_text("utf-8"), re.DOTALL | re.MULTILINE)
+    assert len(shown) == 3
+    monkeypatch.chdir(tmp_path)
+    exec(compile(shown[number], str(document), "exec"), {})
+    printed = capsys.readouterr().out.split()
+    if number == 2:
+        assert float(printed[-1]) == pytest.approx(0.125, abs=1e-6)  # 0.05 N for 50 ms, and 2 cm/s
+    assert printed
