@@ -101,8 +101,7 @@ def batch_runs(problem: Problem, tolerance: float):
             if loads is not None:
                 integrator.pars[:] = loads[:, None]
             if kick is not None:
-                for number in range(FLIGHTS):
-                    kick(integrator.state[:, number])
+                kick(integrator.state)
             integrator.propagate_until(end)
 
     return run, lambda: peers_heyoka.row_of(integrator.state[:, 0], axes), restart

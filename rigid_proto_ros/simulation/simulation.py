@@ -43,7 +43,7 @@ from .commands import (
     slot_name,
 )
 from .effects import APPLY, CUT, END_ALL, END_DUE, FINISH, FLY
-from .flight_arrays import NOTEWORTHY, ActingLoad, FlightArrays
+from .flight_arrays import NOTEWORTHY, NOW_NS, ActingLoad, FlightArrays
 from .observer import (
     AccuracyFloor,
     Acted,
@@ -288,7 +288,7 @@ class Simulation:
                 self._notify(due)
             self.time_ns = event_ns
             if event_ns == until_ns:
-                return arrays.state
+                return self.state
             # 3. That event is applied, and a new segment begins with the loads active now.
             self._act()
 
@@ -539,8 +539,12 @@ class Simulation:
 
     @property
     def state(self) -> State:
-        """The state, an object of the caller's own."""
-        return self._arrays.state
+        """The state, an object of the caller's own; another thread may ask for it, and gets that of one time."""
+        arrays = self._arrays
+        while True:
+            now_ns, row = arrays.integers[NOW_NS], arrays.row.copy()
+            if arrays.integers[NOW_NS] == now_ns:
+                return State(now_ns, row)
 
     @property
     def acting(self) -> list[ActingLoad]:

@@ -90,6 +90,7 @@ class Flight:
         self._run = OfflineRun(scene, observer=observer)
         self._simulation = self._run.simulation
         self._given: list[tuple[int, Sequence[Command]]] = []  # and when they were
+        self._told: dict[str, int] = {}  # refused commands, by reason
 
     def __enter__(self) -> Flight:
         return self
@@ -121,14 +122,14 @@ class Flight:
         """
         simulation = self._simulation
         until_ns = _end_ns(simulation.time_ns, seconds)
-        before = simulation.refused.copy()
         if self._observer is None:
-            simulation.advance(until_ns)
+            state = simulation.advance(until_ns)
         else:
             self._run.advance(until_ns)
-        if simulation.failure or simulation.refused != before:
-            raise self._trouble(before)
-        return simulation.state
+            state = simulation.state
+        if simulation.failure or simulation.refused != self._told:
+            raise self._trouble()
+        return state
 
     def fly(
         self, commands: Iterable[Mapping[str, object] | Commands], seconds: float, scene: Scene | None = None
@@ -142,15 +143,15 @@ class Flight:
             read += entry if isinstance(entry, tuple) else read_command(entry)
         self._scene = scene = scene or self._scene
         self._given = [(0, read)]
-        before = simulation.refused.copy()
         self._run.fly(scene, read, until_ns)
-        if simulation.failure or simulation.refused != before:
-            raise self._trouble(before)
+        if simulation.failure or simulation.refused != self._told:
+            raise self._trouble()
         return simulation.state
 
-    def _trouble(self, before: Mapping[str, int]) -> InputError:
-        """Why the motion has failed, or which commands were refused since so many were, by reason."""
+    def _trouble(self) -> InputError:
+        """Why the motion has failed, or which commands were refused as they came to act and haven't been told of."""
         simulation = self._simulation
+        before, self._told = self._told, simulation.refused.copy()
         if simulation.failure:
             return InputError("step", simulation.failure)
         new = {reason: count - before.get(reason, 0) for reason, count in simulation.refused.items()}
