@@ -1,12 +1,14 @@
 # SPDX-License-Identifier: MIT
 """`auto` against heyoka.py at equal error of the final attitude: the shortest of many runs taken in turn, in one process.
 
-Each problem is flown from three starts, to two ends each. The error of a tool at an accuracy or tolerance is the largest of
-the six flights, its time their mean; times at an error are read off the two curves (log-log). `kernel` is the compiled loop over steps, one call from Python as heyoka's propagate_until is; `simulation` is
-Simulation.advance with its commands and segments; `flight` is `Flight`, reset and commanded; `sweep` is a row of a sweep's compiled block, its body and end state
-included, on one core. What heyoka compiles, one system and tolerance at a time, isn't counted.
+Each problem is flown from three starts, to two ends each. The error of a tool at an accuracy or tolerance is the largest
+of the six flights, its time their mean; times at an error are read off the two curves (log-log). `kernel` is the compiled
+loop over steps, one call from Python as heyoka's propagate_until is; `simulation` is Simulation.advance with its commands
+and segments; `flight` is `Flight`, reset and commanded; `sweep` is a row of a sweep's compiled block, its body and end
+state included, on one core; `heyoka batch` is a flight of eight side by side. What heyoka compiles, one system and
+tolerance at a time, isn't counted.
 
-    python benchmarks/heyoka_ratios.py [--only P2,damped,...] [--seconds 20]
+    python benchmarks/heyoka_ratios.py [--only P2,damped,...] [--seconds 20] [--every 1]
 """
 
 from __future__ import annotations
@@ -80,26 +82,33 @@ def whole(prepare):
 def batch_runs(problem: Problem, tolerance: float):
     """FLIGHTS flights side by side by heyoka, of which the first is the problem's and the others nearly so."""
     axes, start = peers_heyoka.start_of(problem)
-    if not problem.constant_body_wrench:
-        return None
     starts = np.repeat(start[:, None], FLIGHTS, axis=1)
     starts[4:7] *= 1.0 + 1e-3 * np.arange(FLIGHTS)
-    integrator = heyoka.taylor_adaptive_batch(peers_heyoka.system(problem, axes), starts.copy(), tol=tolerance)
+    integrator = heyoka.taylor_adaptive_batch(
+        peers_heyoka.system(problem, axes),
+        starts.copy(),
+        pars=np.zeros((peers_heyoka.parameters(problem), FLIGHTS)),
+        tol=tolerance,
+    )
+    pieces = peers_heyoka.pieces_of(problem, axes)
 
     def restart():
         integrator.set_time(0.0)
         integrator.state[:] = starts
 
     def run():
-        integrator.propagate_until(problem.duration)
+        for _, end, loads, kick in pieces:
+            if loads is not None:
+                integrator.pars[:] = loads[:, None]
+            if kick is not None:
+                kick(integrator.state)
+            integrator.propagate_until(end)
 
     return run, lambda: peers_heyoka.row_of(integrator.state[:, 0], axes), restart
 
 
 def sweep_runs(problem: Problem, accuracy: float):
     """ROWS rows by a sweep's compiled block, of which the first is the problem's and the others nearly so."""
-    if problem.spring is not None:
-        return None
     setup = setup_of(problem, "auto", 1e-3, accuracy)
     own = np.repeat(np.array([setup.scene], SCENE), ROWS)
     own["initial_angular_velocity"] *= 1.0 + 1e-3 * np.arange(ROWS)[:, None] / ROWS
@@ -134,7 +143,7 @@ CURVES = {
 }
 
 
-def curves(problem: Problem, seconds: float) -> dict[str, list[dict]]:
+def curves(problem: Problem, seconds: float, every: int = 1) -> dict[str, list[dict]]:
     """For each way rows of a flight's time [s] and error [rad]. The time is the shortest: whatever else the machine does only
     adds to it.
     """
@@ -142,7 +151,7 @@ def curves(problem: Problem, seconds: float) -> dict[str, list[dict]]:
     references = [reference_row(variant) for variant in flown]
     known: list[tuple[str, list, float, list]] = []
     for what, prepare in CURVES.items():
-        for knob in KNOBS:
+        for knob in KNOBS[::every]:
             made = [prepare(variant, knob) for variant in flown]
             if None in made:
                 break
@@ -181,10 +190,11 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--only", default=",".join(JUDGED_BY_VARIANTS))
     parser.add_argument("--seconds", type=float, default=20.0, help="of timing, for each problem")
+    parser.add_argument("--every", type=int, default=1, help="of the tolerances, to compile fewer systems")
     options = parser.parse_args()
     table = ResultTable(Path(__file__).parent / "results" / "heyoka.csv", COLUMNS)
     for name in options.only.split(","):
-        found = curves(PROBLEMS[name], options.seconds)
+        found = curves(PROBLEMS[name], options.seconds, options.every)
         for target in TARGETS:
             theirs, all_theirs = time_at_error(found["heyoka"], target), whole_at_error(found["heyoka"], target)
             for what, rows in found.items():

@@ -117,15 +117,25 @@ def _loads(w: Wrench, axes) -> np.ndarray:
 
 
 def _impulse(problem: Problem, axes, w: Wrench):
-    """What an impulse does to the variables."""
+    """What an impulse does to the variables (13,), or to those of several flights side by side (13, n)."""
     inverse = 1.0 / np.diag(axes.T @ np.array(problem.inertia) @ axes)
+    force, torque, arm = np.array(w.force), np.array(w.torque), axes.T @ w.point
 
     def kick(state):
         R = rotation(state[0:4])
-        force, torque = np.array(w.force), np.array(w.torque)
+        if state.ndim > 1:
+            own, turn = (
+                np.repeat((axes.T @ v)[:, None], state.shape[1], axis=1)
+                if w.axes == "body"
+                else R[0] * v[0] + R[1] * v[1] + R[2] * v[2]
+                for v in (force, torque)
+            )
+            state[4:7] += inverse[:, None] * (turn + np.cross(arm[:, None], own, axis=0))
+            state[10:13] += (R * own).sum(axis=1) / problem.mass
+            return
         own = axes.T @ force if w.axes == "body" else R.T @ force
         turn = axes.T @ torque if w.axes == "body" else R.T @ torque
-        state[4:7] += inverse * (turn + np.cross(axes.T @ w.point, own))
+        state[4:7] += inverse * (turn + np.cross(arm, own))
         state[10:13] += (R @ own) / problem.mass
 
     return kick

@@ -180,7 +180,7 @@ def scene_of(problem: Problem, accuracy: float) -> Scene:
 
 
 def prepare_flight(problem: Problem, accuracy: float) -> Run:
-    """A ``Flight`` that is reset, as a user of Python flies it many times: commands are read once."""
+    """A ``Flight`` that begins again, as a user of Python flies it many times: commands are read once."""
     flight, commands = Flight(scene_of(problem, accuracy)), []
     for w in problem.wrenches:
         at, begin = {"at": {"point": list(map(float, w.point))}, "axes": w.axes}, float(w.begin)
@@ -193,13 +193,8 @@ def prepare_flight(problem: Problem, accuracy: float) -> Run:
             duration = (round(w.end * 1e9) - round(w.begin * 1e9)) / 1e9
             commands.append(read_command({"t": begin, **at, "force": force, "torque": torque, "duration": duration}))
 
-    def restart():
-        flight.reset()
-        for command in commands:
-            flight.command(command)
-
-    restart()
-    return Run(restart, flight.step, lambda: flight.sample().row, lambda: 0)
+    # Setting back, commanding and simulating are one call.
+    return Run(lambda: None, lambda until: flight.fly(commands, until), lambda: flight.sample().row, lambda: 0)
 
 
 @dataclass

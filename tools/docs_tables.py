@@ -299,6 +299,72 @@ def skipped_work() -> str:
     return f"{_measured_on(measured[0])}.\n\n{_table(('work', 'if done', 'as it is'), rows)}"
 
 
+_BESIDE_HEYOKA = {
+    "the compiled steps alone": ("kernel", "heyoka", ""),
+    "`Simulation`, with its Python code": ("simulation", "heyoka", ""),
+    "`Simulation`: reset, commands and simulation": ("simulation", "heyoka", "whole_"),
+    "`Flight`: reset, commands and simulation": ("flight", "heyoka", "whole_"),
+    "a row of a sweep, beside one flight": ("sweep", "heyoka", "whole_"),
+    "a row of a sweep, beside a flight in batches of 8": ("sweep", "heyoka batch", "whole_"),
+}
+"""What is compared: ours, heyoka's, and whether setting back and submitting count."""
+_FLOWN_BY_HEYOKA = {
+    "P2": "P2",
+    "P2x100": "P2, 100 times the spin",
+    "damped": "damped",
+    "heavy": "heavy crate on a rope",
+    "pokes": "pokes",
+}
+
+
+def heyoka() -> str:
+    """Run time of heyoka.py over ours at equal error, from the last benchmark's own numbers."""
+    measured = read_rows(RESULTS / "heyoka.csv")
+    found = {(row["problem"], row["what"], row["error_rad"]): row for row in measured}
+    targets = sorted({row["error_rad"] for row in measured}, reverse=True)
+    rows = []
+    for what, (own, other, whole) in _BESIDE_HEYOKA.items():
+        cells = []
+        for problem in _FLOWN_BY_HEYOKA:
+            both = [(found.get((problem, own, at)), found.get((problem, other, at))) for at in targets]
+            ratios = [b[f"{whole}us"] / a[f"{whole}us"] if a and b else math.nan for a, b in both]
+            cells.append(" / ".join(f"{r:.2f}" if math.isfinite(r) else "" for r in ratios) if any(both[0]) else "")
+        rows.append((what, *(cell if cell.strip(" /") else "" for cell in cells)))
+    head = (" / ".join(f"1e{math.log10(at):.0f}" for at in targets) + " rad", *_FLOWN_BY_HEYOKA.values())
+    return f"{_measured_on(measured[0])}, commit {measured[0]['commit']}.\n\n{_table(head, rows)}"
+
+
+def recording() -> str:
+    """What recording a state costs, from the last benchmark's own numbers."""
+    measured = read_rows(RESULTS / "recording.csv")
+    rows = []
+    for row in measured:
+        states, cost = row["states"], row["us_per_state"]
+        size, memory = 1e6 * row["file_mb"] / states, row["memory_mb_at_the_end"] - row["memory_mb_at_a_third"]
+        rows.append((row["recorder"], f"{_three(cost)} µs", f"{1e6 / cost:,.0f}", f"{size:.0f}", f"{memory:+.0f} MB"))
+    head = ("recorder", "processor time a state", "states a second", "bytes a state", "memory, from a third to the end")
+    return f"{_measured_on(measured[0])}: {measured[0]['states']:,.0f} states at 1 kHz.\n\n{_table(head, rows)}"
+
+
+def _three(number: float) -> str:
+    """Three digits, without an exponent."""
+    return f"{number:,.0f}" if number >= 100.0 else f"{number:.3g}"
+
+
+def sweeps() -> str:
+    """Rows of sweeps, from the last benchmark's own numbers."""
+    measured = read_rows(RESULTS / "sweep.csv")
+    rows = []
+    for row in measured:
+        error = f"{row['median_error_rad']:.1e}" if math.isfinite(row["median_error_rad"]) else ""
+        memory = f"{row['memory_mb']:.0f} MB" if math.isfinite(row["memory_mb"]) else ""
+        note = row["note"] if row["what"].startswith("mujoco") else ""
+        what = ", ".join(filter(None, (row["what"], note)))
+        rows.append((what, f"{row['rows']:,.0f}", f"{_three(row['us_per_row'])} µs", error, memory))
+    head = ("what", "rows", "time a row, all cores", "median error [rad]", "peak memory")
+    return f"{_measured_on(measured[0])}, {measured[0]['threads']:.0f} cores.\n\n{_table(head, rows)}"
+
+
 def identification() -> str:
     """One throw, its body found by ours and by the peers, from the last benchmark's own numbers."""
     measured = read_rows(RESULTS / "identification.csv")
@@ -482,6 +548,9 @@ TABLES = {
     "engines": engines,
     "engine_flights": engine_flights,
     "engine_inertia": engine_inertia,
+    "heyoka": heyoka,
+    "recording": recording,
+    "sweeps": sweeps,
     "site": lambda: site_line(address()),
 }
 

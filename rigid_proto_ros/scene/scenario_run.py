@@ -292,6 +292,16 @@ class OfflineRun(ScenarioRun):
             self.announce()
             self.begin_ghost()
 
+    def fly(self, scenario: Scenario, script: Sequence[Command], until_ns: int) -> bool:
+        """``restart`` with this scenario, ``submit`` and ``advance`` in one; raises InputError."""
+        if not self._is_observed and self.simulation.fly(scenario.setup, script, until_ns):
+            self.scenario, self.submitted = scenario, len(script)
+            self._rates_ns.clear()
+            return True
+        self.restart(scenario)
+        self.submit(script)
+        return self.advance(until_ns)
+
     def _all_checked(self, commands: Sequence[Command]) -> list[tuple[Command, Scenario]]:
         taken: list[tuple[Command, Scenario]] = []
         try:

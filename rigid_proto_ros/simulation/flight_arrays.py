@@ -17,7 +17,6 @@ from ..base.vectors import Attitude, FloatArray
 from ..motion.integrators.stepping import ROOM
 from ..motion.loads import Load, load_of_bytes
 from ..motion.problem import PROBLEM, VARIABLES
-from ..motion.state import State
 from ..motion.string import StringState, string_of
 from . import flight as fl
 from .commands import HELD_WRENCH, NO_SLOT, Pending, Row, WrenchCommand, row_of
@@ -43,7 +42,7 @@ def _numbers(*names: str) -> list[int]:
     return [place_of(FLIGHT, name) // 8 for name in names]
 
 
-_NOW_NS, _START_NS, _ACTING, _DUE, _DUE_END, _EVENTS, _ROTOR_NS = _numbers(
+NOW_NS, _START_NS, _ACTING, _DUE, _DUE_END, _EVENTS, _ROTOR_NS = _numbers(
     "now_ns", "start_ns", "acting", "due", "due_end", "events", "rotor_ns"
 )
 NOTEWORTHY, _LOAD_IDS, _METHOD = _numbers("noteworthy", "load_ids", "method")
@@ -148,8 +147,8 @@ class FlightArrays:
     def leap(self, to_ns: int) -> None:
         """Go on at a later time in the same state, with what acts; what is due by then hasn't ended yet."""
         self.call(CUT, 0)
-        self.integers[_ROTOR_NS] += to_ns - self.integers[_NOW_NS]  # a flywheel keeps its momentum
-        self.integers[_NOW_NS] = self.integers[_START_NS] = to_ns
+        self.integers[_ROTOR_NS] += to_ns - self.integers[NOW_NS]  # a flywheel keeps its momentum
+        self.integers[NOW_NS] = self.integers[_START_NS] = to_ns
         self.call(FINISH, 0)
 
     # Commands
@@ -246,16 +245,7 @@ class FlightArrays:
     @property
     def time_ns(self) -> int:
         """Simulated time [ns]."""
-        return self.integers[_NOW_NS]
-
-    @property
-    def state(self) -> State:
-        """The current state; another thread may ask for it, and gets that of one time."""
-        numbers = self.integers
-        while True:
-            now_ns, row = numbers[_NOW_NS], self.row.copy()
-            if numbers[_NOW_NS] == now_ns:
-                return State(now_ns, row)
+        return self.integers[NOW_NS]
 
     def acting(self) -> Iterator[ActingLoad]:
         """The active loads, in the order in which they began."""

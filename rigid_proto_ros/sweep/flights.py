@@ -18,7 +18,7 @@ import os
 import signal
 import sys
 import threading
-from collections.abc import Callable, Iterable, Iterator, Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from concurrent.futures import ProcessPoolExecutor
 from dataclasses import replace
 from numbers import Real
@@ -89,7 +89,8 @@ class Flight:
         self._scene = scene
         self._run = OfflineRun(scene, observer=observer)
         self._simulation = self._run.simulation
-        self._given: list[tuple[int, Commands]] = []  # and when they were
+        self._given: list[tuple[int, Sequence[Command]]] = []  # and when they were
+        self._told: dict[str, int] = {}  # refused commands, by reason
 
     def __enter__(self) -> Flight:
         return self
@@ -120,26 +121,42 @@ class Flight:
         or when a command is refused as it comes to act.
         """
         simulation = self._simulation
-        # A difference of two times may be a rounding below 0.
-        step_ns = nanoseconds(seconds) if isinstance(seconds, (float, Real)) and abs(seconds) <= MAX_TIME_S else -1
-        if step_ns < 0:
-            raise InputError("step", seconds, f"a number of seconds from 0 to {MAX_TIME_S:g}")
-        until_ns = simulation.time_ns + step_ns
-        if until_ns > _MAX_TIME_NS:
-            raise InputError("step", seconds, f"a step that ends by {MAX_TIME_S:g} s of simulated time")
-        before = simulation.refused.copy()
+        until_ns = _end_ns(simulation.time_ns, seconds)
         if self._observer is None:
             state = simulation.advance(until_ns)
         else:
             self._run.advance(until_ns)
             state = simulation.state
-        if simulation.failure:
-            raise InputError("step", simulation.failure)
-        if simulation.refused != before:
-            new = {reason: count - before.get(reason, 0) for reason, count in simulation.refused.items()}
-            texts = [f"{count} {reason}, {simulation.refusals[reason]}" for reason, count in new.items() if count]
-            raise CommandRefused("schedule", "command", f"refused when it was due to act: {'; '.join(texts)}")
+        if simulation.failure or simulation.refused != self._told:
+            raise self._trouble()
         return state
+
+    def fly(
+        self, commands: Iterable[Mapping[str, object] | Commands], seconds: float, scene: Scene | None = None
+    ) -> State:
+        """``reset``, ``command`` for each and ``step`` in one, which is quicker: begin again at time 0 of the scene, or
+        of another one, let these commands act, simulate so long, and return the state at the end. Raises InputError.
+        """
+        simulation, until_ns = self._simulation, _end_ns(0, seconds)
+        read: list[Command] = []
+        for entry in commands:
+            read += entry if isinstance(entry, tuple) else read_command(entry)
+        self._scene = scene = scene or self._scene
+        self._given = [(0, read)]
+        self._run.fly(scene, read, until_ns)
+        if simulation.failure or simulation.refused != self._told:
+            raise self._trouble()
+        return simulation.state
+
+    def _trouble(self) -> InputError:
+        """Why the motion has failed, or which commands were refused as they came to act and haven't been told of."""
+        simulation = self._simulation
+        before, self._told = self._told, simulation.refused.copy()
+        if simulation.failure:
+            return InputError("step", simulation.failure)
+        new = {reason: count - before.get(reason, 0) for reason, count in simulation.refused.items()}
+        texts = [f"{count} {reason}, {simulation.refusals[reason]}" for reason, count in new.items() if count]
+        return CommandRefused("schedule", "command", f"refused when it was due to act: {'; '.join(texts)}")
 
     def sample(self) -> State:
         """The state now: time_ns, position, orientation_xyzw, linear_velocity, angular_velocity, angular_velocity_body;
@@ -178,6 +195,17 @@ class Flight:
         if self._observer is not None:
             self._run.end()
             self._observer.close()
+
+
+def _end_ns(begin_ns: int, seconds: float) -> int:
+    """When a step ends. Raises InputError."""
+    # A difference of two times may be a rounding below 0.
+    step_ns = nanoseconds(seconds) if isinstance(seconds, (float, Real)) and abs(seconds) <= MAX_TIME_S else -1
+    if step_ns < 0:
+        raise InputError("step", seconds, f"a number of seconds from 0 to {MAX_TIME_S:g}")
+    if begin_ns + step_ns > _MAX_TIME_NS:
+        raise InputError("step", seconds, f"a step that ends by {MAX_TIME_S:g} s of simulated time")
+    return begin_ns + step_ns
 
 
 def fly_study(spec: Mapping[str, object]) -> dict[str, NDArray[Any]]:

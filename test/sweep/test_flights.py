@@ -1,6 +1,7 @@
 # SPDX-License-Identifier: MIT
 """Flights from Python: commanded, stepped and recorded as scripts and the node do it, one by one and on all cores."""
 
+import re
 from pathlib import Path
 
 import numpy as np
@@ -117,6 +118,67 @@ def test_of_an_entry_that_is_refused_nothing_acts() -> None:
     flight.command({"set": {"integrator": "auto"}})
     flight.step(0.1)
     assert flight._run.simulation.attach == (0.0, 0.0, 0.0)
+
+
+PLANS = {
+    "nothing": [],
+    "a wrench that times out": [{"t": 0.0, "wrench": {"torque": [0.0, 0.0, 1e-4]}}],
+    "pokes out of order": [
+        {"t": 0.7, "at": "tip", "force": [0.05, 0.0, 0.0]},
+        {"t": 0.2, "at": {"vertex": 3}, "push": 0.05, "duration": 0.1},
+        {"t": 0.2, "impulse": [0.001, 0.0, 0.0]},
+        {"t": 0.0, "wrench": {"torque": [0.0, 1e-4, 0.0], "slot": "wheel", "duration": 0.5}},
+    ],
+    "a ray": [
+        {"t": 0.1, "at": {"ray": {"origin": [0.0, 0.0, 1.0], "direction": [0.0, 0.0, -1.0]}}, "force": [1, 0, 0]}
+    ],
+    "a change, thrusters, a state and the end of all": SCRIPT,
+    "what is behind the end": [{"t": 2.5, "at": "tip", "force": [0.05, 0.0, 0.0]}],
+    "what is at the end": [{"t": 2.0, "at": "tip", "force": [0.05, 0.0, 0.0]}],
+}
+
+
+@pytest.mark.parametrize("plan", PLANS)
+@pytest.mark.parametrize("record", [False, True])
+def test_a_flight_in_one_call_is_that_in_three_and_goes_on_as_it_does(tmp_path, plan, record) -> None:
+    pytest.importorskip("mcap")
+    scene = load_scene("t_handle")
+    heavier = scene.with_changes({"mass": 0.3, "gravity": [0.0, 0.0, -1.0]})
+    one, three = (Flight(scene, record=tmp_path / f"{name}.mcap" if record else "") for name in ("one", "three"))
+    read = [read_command(entry) for entry in PLANS[plan]]
+    for flown in (scene, heavier, heavier):
+        reached = one.fly(read, 2.0, flown)
+        three.reset(flown)
+        for command in read:
+            three.command(command)
+        assert reached.row.tobytes() == three.step(2.0).row.tobytes() == one.sample().row.tobytes()
+        assert reached.time_ns == one.sample().time_ns == 2_000_000_000
+        assert one.sensitivity() == three.sensitivity()
+        for flight in (one, three):
+            flight.command({"at": "tip", "force": [0.0, 0.05, 0.0]})
+        assert one.step(1.0).row.tobytes() == three.step(1.0).row.tobytes()
+    assert one.fly(PLANS[plan], 2.0).row.tobytes() == reached.row.tobytes()  # entries, and the scene of the last time
+    for flight in (one, three):
+        flight.close()
+
+
+def test_a_flight_in_one_call_says_what_three_calls_say() -> None:
+    flight = Flight(load_scene("t_handle"))
+    with pytest.raises(InputError, match="command 2 at 1 s, .*vertex/0 to vertex"):
+        flight.fly([{"t": 0.5, "force": [0, 0, 1]}, {"t": 1.0, "at": {"vertex": 10**6}, "force": [0, 0, 1]}], 2.0)
+    assert flight.sample().time_ns == 0
+    missed = {"at": {"ray": {"origin": [9, 9, 9], "direction": [1, 0, 0]}}, "force": [1, 0, 0]}
+    for _ in range(2):
+        with pytest.raises(InputError, match="1 ray_miss, frame_id: .*a ray that meets"):
+            flight.fly([missed], 0.1)
+    with pytest.raises(InputError, match="a number of seconds from 0"):
+        flight.fly([], -1.0)
+    with pytest.raises(InputError, match="there is no key frce"):
+        flight.fly([{"frce": [0, 0, 1]}], 1.0)
+    fast = load_scene("t_handle", {"initial.angular_velocity": [1e99, 1e99, 1e99]})
+    with pytest.raises(InputError, match="too fast"):
+        flight.fly([{"t": 0.2, "at": "tip", "force": [0.05, 0.0, 0.0]}], 1.0, fast)
+    assert flight.fly([], 1.0, load_scene("t_handle")).time_ns == 1_000_000_000
 
 
 def test_a_study_from_python_has_the_bits_of_flights_one_by_one_and_a_row_that_fails_its_reason() -> None:
@@ -284,3 +346,19 @@ def test_each_run_of_a_flight_that_is_reset_is_recorded_and_verified(tmp_path) -
                 flight.reset(load_scene("t_handle", {"mass": 0.1 + number}))
     assert [len(run.times) for run in read_runs(path)] == [51, 51, 51]
     assert main(["replay", str(path), "--verify"]) == 0
+
+
+@pytest.mark.parametrize("number", range(3))
+def test_what_the_document_shows_runs_as_it_stands(tmp_path, monkeypatch, capsys, number) -> None:
+    pytest.importorskip("mcap")
+    document = Path(__file__).parents[2] / "docs" / "python.md"
+    if not document.is_file():
+        pytest.skip("the documents are in a source tree")
+    shown = re.findall(r"^```python\n(.*?)^```", document.read_text("utf-8"), re.DOTALL | re.MULTILINE)
+    assert len(shown) == 3
+    monkeypatch.chdir(tmp_path)
+    exec(compile(shown[number], str(document), "exec"), {})
+    printed = capsys.readouterr().out.split()
+    if number == 2:
+        assert float(printed[-1]) == pytest.approx(0.125, abs=1e-6)  # 0.05 N for 50 ms, and 2 cm/s
+    assert printed
