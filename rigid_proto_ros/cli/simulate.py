@@ -202,6 +202,8 @@ def _print_summary(result: dict[str, Any], recordings: list[str]) -> None:
         "integrator": f" {result['integrator']}, {result['steps']} steps",
         "state hash": f" {result['state_hash']}",
     }
+    if any(result["rotor_momentum"]):
+        rows["flywheel (body)"] = vector("rotor_momentum", "N m s")
     if "sensitivity" in result:
         rows["sensitivity"] = _moved(**result["sensitivity"])
     for name, value in rows.items():

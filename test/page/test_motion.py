@@ -187,6 +187,7 @@ SCRIPTED = {
     "same_force_three_ways": ("t_handle", 8.5),
     "weigh_at_com": ("weigh_by_throwing", 3.0),
     "weigh_by_throwing": ("weigh_by_throwing", 3.0),
+    "wheel_spun_up": ("flywheel", 3.0),
 }
 """Of each example script the scene that it is for, and seconds."""
 

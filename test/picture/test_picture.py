@@ -325,7 +325,7 @@ def test_momentum_is_that_of_body_and_flywheel_and_with_one_nothing_rolls():
     simulation = Simulation(flight_setup(body, integrator="auto", initial=start), ToPicture())
     simulation.announce()
     momentum = simulation.angular_momentum
-    for second, rotor in ((0, {}), (1, {"rotor_torque": (0.0, 0.5, 0.2)}), (3, {"rotor_torque": (0.0, 0.0, 0.0)})):
+    for second, rotor in ((0, {}), (1, {"rotor_torque": (0.0, 0.5, 0.2)}), (2, {"rotor_torque": (0.0, 0.0, 0.0)})):
         setup = changed(simulation.setup, **rotor)
         simulation.submit(Change({}, lambda setup=setup: setup))
         simulation.act()
@@ -334,7 +334,7 @@ def test_momentum_is_that_of_body_and_flywheel_and_with_one_nothing_rolls():
     plotted = np.array(list(drawn.parts[style.ANGULAR_MOMENTUM].values()))
     assert len(plotted) == 24
     assert np.abs(plotted[:, :3] - momentum).max() < 1e-8
-    assert np.abs(simulation.rotor_momentum).max() == 1.0
+    assert simulation.rotor_momentum.tolist() == [0.0, 0.5, 0.2]
     tips = drawn.parts[style.POINSOT_OMEGA]
     assert [bool(len(tips[time_ns])) for time_ns in sorted(tips)] == 8 * [True] + 16 * [False]
     assert not len(drawn.at_end(style.POINSOT_PLANE))

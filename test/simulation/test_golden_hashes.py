@@ -277,6 +277,7 @@ EXAMPLE_SCENES = {
     "com_or_rim": "com_or_rim",
     "weigh_at_com": "weigh_by_throwing",
     "weigh_by_throwing": "weigh_by_throwing",
+    "wheel_spun_up": "flywheel",
 }
 """The scenes that the examples are meant for, where it isn't the T-handle."""
 
