@@ -31,7 +31,7 @@ HERE = Path(__file__).resolve().parent
 sys.path[:0] = [str(HERE.parent), str(HERE), str(HERE.parent / "test")]
 
 from mass_solids import sphere
-from mesh_files import CUBE_QUADS, CUBE_TRIANGLES, CUBE_VERTICES, obj, off, ply, ply_binary, stl, stl_text
+from mesh_files import CUBE_QUADS, CUBE_TRIANGLES, CUBE_VERTICES, obj, ply, ply_binary, stl, stl_text
 
 from result_table import ResultTable
 from rigid_proto_ros import __version__
@@ -76,7 +76,6 @@ def large_files(rings: int) -> dict[tuple[str, str], bytes]:
     return {
         (".obj", "triangles"): obj(v, t),
         (".obj", "with normals"): with_normals(obj(v, t)),
-        (".off", "triangles"): off(v, t),
         (".ply", "text"): ply(v, t),
         (".ply", "binary"): ply_binary(v, t),
         (".stl", "text"): stl_text(v, t),
@@ -92,13 +91,6 @@ def interleaved() -> bytes:
     return "\n".join([*lines, ""]).encode()
 
 
-def coloured_off() -> bytes:
-    lines = off(faces=CUBE_QUADS).decode().splitlines()
-    lines[0] = "COFF # with colours"
-    lines[2:10] = [line + " 255 0 0 255" for line in lines[2:10]]
-    return "\n".join([*lines, ""]).encode()
-
-
 def small_files() -> dict[tuple[str, str], tuple[bytes, int]]:
     """By format and what is special: the cube's bytes and how many vertices its reader should find."""
     rich = obj(faces=CUBE_QUADS).decode().replace("f 1 2 4 3", "f 1/1/1 2//1 \\\n 4/2 3/3/3 # the first")
@@ -110,9 +102,6 @@ def small_files() -> dict[tuple[str, str], tuple[bytes, int]]:
         (".obj", "v/vt/vn corners on a continued line"): (("vt 0 0\nvn 0 0 1\n" + rich).encode(), 8),
         (".obj", "a byte order mark"): (b"\xef\xbb\xbf" + obj(), 8),
         (".obj", "a vertex that no face has"): (b"v 9 9 9\n" + obj(faces=CUBE_TRIANGLES + 1), 9),
-        (".off", "quads"): (off(faces=CUBE_QUADS), 8),
-        (".off", "colours and a comment"): (coloured_off(), 8),
-        (".off", "counts on the first line"): (off().replace(b"OFF\n", b"OFF ", 1), 8),
         (".ply", "quads"): (ply(faces=CUBE_QUADS), 8),
         (".ply", "binary, big-endian, quads"): (ply_binary(faces=CUBE_QUADS, big=True), 8),
         (".stl", "binary, a header that begins with solid"): (b"solid".ljust(80) + stl()[80:], 8),

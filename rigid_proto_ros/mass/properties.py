@@ -61,15 +61,15 @@ def _checked_ballast(ballast: Sequence[Sequence[float]]) -> FloatArray:
     return np.array([entry for entry in ballast if entry[0] > 0.0], dtype=float).reshape(-1, 4)
 
 
-def _checked_mass(mass: float, density: float, volume: Callable[[], float]) -> float:
-    """[kg]: ``mass`` when > 0, else density × volume."""
+def _checked_mass(mass: float, density: float, measure: Callable[[], float], stretch: float) -> float:
+    """[kg]: ``mass`` when > 0, else density × measure × stretch."""
     if not (0.0 <= mass < math.inf):
         raise InputError("mass", mass, "a finite number >= 0 (0: density decides) [kg]")
     if mass > 0.0:
         return float(mass)
     if not (0.0 < density < math.inf):
         raise InputError("density", density, "a finite number > 0 [kg/m³]")
-    body = float(density) * volume()
+    body = float(density) * measure() * stretch
     if not (1e-300 < body < math.inf):
         raise InputError("mass", body, "density * volume within 1e-300 .. 1e300 kg")
     return body
@@ -159,8 +159,8 @@ class MeshMoments:
         """Mass [kg] without ballast: ``mass`` when > 0, else density × solid volume, the same for all models; of parts
         the sum of their masses at a density of 1000, and in proportion at another.
         """
-        volume = abs(math.prod(scale_vector(scale).tolist()))
-        return _checked_mass(mass, density, lambda: self.moments("solid").measure * volume)
+        stretch = abs(math.prod(scale_vector(scale).tolist()))
+        return _checked_mass(mass, density, lambda: self.moments("solid").measure, stretch)
 
     def mass_properties(
         self,
@@ -188,7 +188,8 @@ class MeshMoments:
         points = _checked_ballast(ballast)
         if model == "walled":
             moments, _ = self.printed(s, wall_thickness, infill)
-            own = _checked_mass(mass, density, lambda: moments.measure * abs(float(s[0])) ** 3)
+            unit_m = abs(float(s[0]))
+            own = _checked_mass(mass, density, lambda: moments.measure, unit_m * unit_m * unit_m)
         else:
             moments = self.moments(model, s)
             own = self.body_mass(scale=s, mass=mass, density=density)

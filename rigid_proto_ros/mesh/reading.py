@@ -20,13 +20,12 @@ from .assembly import MAX_TRIANGLES, Assembly, add_by_trimesh, add_collada, othe
 from .gltf import add_gltf
 from .locate import NOWHERE_ELSE, Search, resolve_mesh
 from .obj import read_obj
-from .off import read_off
 from .parts import YAML, Part, hash_of_parts, joined_surface, read_parts
 from .ply import read_ply
 from .stl import read_stl
 from .threemf import add_threemf
 
-OWN_FORMATS = {"obj": read_obj, "off": read_off, "ply": read_ply, "stl": read_stl}
+OWN_FORMATS = {"obj": read_obj, "ply": read_ply, "stl": read_stl}
 """Formats of one surface, and what gives vertices, polygons' corners and starts of a file's bytes and name. trimesh 5.2
 silently misreads some files of each (benchmarks/mesh_readers.py)."""
 FORMATS = (*OWN_FORMATS, "glb", "gltf", "3mf", "dae")

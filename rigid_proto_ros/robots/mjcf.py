@@ -6,7 +6,6 @@ orientations.
 from __future__ import annotations
 
 import importlib.util
-import math
 from collections.abc import Iterator
 from dataclasses import replace
 from pathlib import Path
@@ -18,10 +17,6 @@ from ..base.files import read_bounded
 from . import reading as rd
 from .mjcf_compiler import Question, ask
 
-MAX_ELEMENTS = 20_000
-"""Of one model, replicated and attached ones counted: 3000 bodies with a geom each took 3.4 s of a core and 116 MB."""
-PIXELS = 1000
-"""Of a texture or height field that count as one element."""
 MAX_INCLUDES = 200
 """Of one model, the includes of included files counted."""
 
@@ -46,48 +41,6 @@ def _include(parent: Element, main: Path, path: Path, left: Iterator[int]) -> No
         parent[place : place + 1] = list(content)
 
 
-def _whole(text: str | None) -> int:
-    """A count as a file has it, at least 1; 1 also for what MuJoCo will refuse."""
-    try:
-        return max(1, int(float(text or "1")))
-    except (ValueError, OverflowError):
-        return 1
-
-
-def _elements(element: Element, models: dict[str, int]) -> int:
-    """Elements that MuJoCo makes of one: what is replicated as often as that, the points of what is composed, pixels of
-    textures and height fields, and the models (elements of each, by name) that are attached.
-    """
-    total = 1 + sum(_elements(child, models) for child in element)
-    words = {name: [_whole(word) for word in text.split()] for name, text in element.attrib.items()}
-    if element.tag == "replicate":
-        return total * math.prod(words.get("count", []))
-    if element.tag in ("composite", "flexcomp"):
-        return total + math.prod(words.get("count", []))
-    if element.tag in ("texture", "hfield"):
-        return (
-            total + math.prod(math.prod(words.get(name, [])) for name in ("width", "height", "nrow", "ncol")) // PIXELS
-        )
-    return total + models.get(element.get("model", ""), 0) if element.tag == "attach" else total
-
-
-def _check_size(root: Element, path: Path, known: dict[Path, int]) -> None:
-    """Put into ``known`` how many elements MuJoCo makes of a file, with the models that it attaches. Raises InputError
-    beyond MAX_ELEMENTS, for which MuJoCo may take hours and all memory.
-    """
-    models, known[path] = {}, 0  # of a model within itself, which MuJoCo refuses
-    for model in root.iter("model"):
-        file = path.parent / model.get("file", "")
-        if file.is_file() and file not in known:
-            content = rd.parse_xml(read_bounded(file, rd.MAX_BYTES, "robot file", "an MJCF file", ordinary=True), file)
-            _check_size(content, file, known)
-        models[model.get("name", "") or file.stem] = known.get(file, 0)
-    total = _elements(root, models)
-    if total > MAX_ELEMENTS:
-        raise InputError("robot file", f"{path.name} replicates to {total:.3g} elements", f"at most {MAX_ELEMENTS}")
-    known[path] = total
-
-
 def read_mjcf(root: Element, path: Path) -> rd.Robot:
     """The bodies of a <mujoco>; raises InputError for what MuJoCo refuses, and without it."""
     if importlib.util.find_spec("mujoco") is None:
@@ -95,7 +48,6 @@ def read_mjcf(root: Element, path: Path) -> rd.Robot:
     inertials = {body.get("name", ""): body.find("inertial") for body in root.iter("body")}
     try:
         _include(root, path, path, iter(range(MAX_INCLUDES)))
-        _check_size(root, path, {})
     except RecursionError:
         raise InputError("robot file", path.name, "elements within each other as deep as MuJoCo takes them") from None
     if any(not model.get("file") for model in root.iter("model")):  # MuJoCo may loop at a later file after such a one

@@ -20,7 +20,7 @@ TETRAHEDRON = "v 0 0 0\nv 1 0 0\nv 0 1 0\nv 0 0 1\nf 1 3 2\nf 1 2 4\nf 1 4 3\nf 
 MESHES = {
     "missing.obj": (None, "there is no file"),
     "open.obj": (TETRAHEDRON.replace("f 2 3 4\n", ""), "--repair (mesh_repair), --fallback hull|box (mesh_fallback)"),
-    "what.part": (TETRAHEDRON, ".obj, .off, .ply, .stl"),
+    "what.part": (TETRAHEDRON, ".obj, .ply, .stl"),
 }
 
 

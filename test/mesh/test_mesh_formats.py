@@ -21,7 +21,6 @@ WHOLE = {
     "a.obj": obj(),
     "quads.obj": obj(faces=CUBE_QUADS),
     "a.off": off(),
-    "quads.off": off(faces=CUBE_QUADS),
     "a.stl": stl(),
     "text.stl": stl_text(),
     "a.ply": ply(),
