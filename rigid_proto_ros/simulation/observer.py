@@ -264,7 +264,7 @@ class EventLog:
     """
 
     def __init__(self, chained: bool = True) -> None:
-        self._chained = chained
+        self.chained = chained
         self.reset()
 
     def reset(self) -> None:
@@ -291,16 +291,16 @@ class EventLog:
     def note(self, time_ns: int, event: Command | tuple[str, dict[str, Any]]) -> None:
         """Add an event whose line nobody wants now: a command that has acted, or kind and content of another one."""
         self.count += 1
-        if not self._chained:
+        if not self.chained:
             return
         self._noted.append((time_ns, event))
         if len(self._noted) >= MOST_NOTED:
             self._chain_noted()
 
     def _need_chain(self) -> None:
-        if not self._chained and self.count:
+        if not self.chained and self.count:
             raise RuntimeError("no chain of events was kept: the simulation began without an observer")
-        self._chained = True
+        self.chained = True
 
     def _chain_noted(self) -> None:
         noted, self._noted = self._noted, []

@@ -93,7 +93,7 @@ class Setup:
 
 
 _INTEGRATORS = tuple(INTEGRATORS.values())
-_INTEGRATOR = place_of(FLIGHT, "integrator") // 8
+_INTEGRATOR, _CODE = place_of(FLIGHT, "integrator") // 8, place_of(REFUSAL, "code") // 8
 
 
 def _numbers_of(field: str) -> slice:
@@ -119,16 +119,17 @@ def make_setup(
     lacks the moments of a model that the scene needs.
     """
     mesh = new_record(MESH) if mesh is None else mesh
-    memory, refusal = np.zeros(FLIGHT.itemsize // 8), new_record(REFUSAL)
+    # By their memory: fields of records by name take several times as long.
+    memory, noted = np.zeros(FLIGHT.itemsize // 8), np.zeros(REFUSAL.itemsize // 8, np.int64)
     flight: np.record = np.ndarray(1, FLIGHT, memory)[0]
+    refusal: np.record = np.ndarray(1, REFUSAL, noted)[0]
     while not begin(scene, mesh, flight, refusal):
-        if refusal["code"] != rf.NO_MOMENTS:
+        if noted[_CODE] != rf.NO_MOMENTS:
             raise _refused_scene(scene, refusal, mesh_name)
         if provide is None:
             raise InputError("mesh", "a mesh is needed, unless inertia_model is explicit")
         mesh = provide(INERTIA_MODELS[refusal.detail], scene.scale)
-    warnings = _tensor_warnings(scene, refusal, mesh_name) if refusal["code"] == rf.TENSOR else ()
-    # By the memory: fields of a record by name take three times as long.
+    warnings = _tensor_warnings(scene, refusal, mesh_name) if noted[_CODE] == rf.TENSOR else ()
     integers, body, initial = memory.view(np.int64).data, memory[_BODY], memory[_ROW]
     integrator = _INTEGRATORS[integers[_INTEGRATOR]]
     own = (contacts or {}, thrusters or {}, flight, integers, initial, Body(body), integrator, warnings)

@@ -244,10 +244,11 @@ class Simulation:
 
     def fly(self, setup: Setup, commands: Iterable[Command], until_ns: int) -> bool:
         """``reset``, ``submit`` of commands of one list and ``advance`` in one, with the same bits: quicker, because no
-        command waits. Returns False, with nothing flown, for what takes those three: a simulation with an observer, a
-        motion that fails, and commands other than wrenches and pokes whose point is known and which act before the end.
+        command waits. Returns False, with nothing flown, for what takes those three: a simulation whose events are told
+        or chained, a motion that fails, and commands other than wrenches and pokes whose point is known and which act
+        before the end.
         """
-        if self.observer.takes:
+        if self.observer.takes or self.events.chained:
             return False
         self._reset_untold(setup)
         rows = list[Row]()

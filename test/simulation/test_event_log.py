@@ -97,3 +97,13 @@ def test_a_simulation_without_an_observer_chains_nothing_however_many_events_the
     # It says so, and gives no hash of a part.
     with pytest.raises(RuntimeError, match="no chain of events was kept"):
         _ = alone.events.sha256
+
+
+def test_events_that_are_chained_are_never_flown_over():
+    setup, push = flight_setup(BODY), wrench("body", (0.1, 0.0, 0.0))
+    alone, observed = Simulation(setup), Simulation(setup, Observer())
+    assert alone.fly(setup, [push], SECOND) and not observed.fly(setup, [push], SECOND)
+    observed.reset()
+    observed.submit(push, 0, (0, 1))
+    assert observed.advance(SECOND).row.tobytes() == alone.state.row.tobytes()
+    assert observed.events.count == 2  # the reset and the wrench
