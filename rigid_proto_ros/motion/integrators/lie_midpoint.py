@@ -104,7 +104,10 @@ def _step(y: Variables, p: np.record, h: float, out: Variables) -> bool:
     A, B, C = p.moments[0], p.moments[1], p.moments[2]
     q, w, _, _ = parts_of(y)
     wx, wy, wz = o = w
-    mean = rotor_momentum(y[TIME] + 0.5 * h, p)
+    mean = (0.0, 0.0, 0.0)
+    if p.has_rotor:
+        mean = rotor_momentum(y[TIME] + 0.5 * h, p)
+        out[TIME] = later(y[TIME], h)
     change = 0.0
     converged = False
     for _ in range(_MAX_ITERATIONS):
@@ -133,7 +136,6 @@ def _step(y: Variables, p: np.record, h: float, out: Variables) -> bool:
             average = (y[10 + k] + 0.5 * h * (push[k] + added[k])) / (1.0 + 0.5 * h * c)
             out[7 + k] = y[7 + k] + h * average
             out[10 + k] = y[10 + k] + h * (push[k] + added[k] - c * average)
-    out[TIME] = later(y[TIME], h)
     return converged
 
 
