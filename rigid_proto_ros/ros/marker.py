@@ -10,8 +10,10 @@ from pathlib import Path
 import numpy as np
 
 from ..base.rotation import matrix_from_quaternion, times
-from ..base.vectors import Vector3
+from ..base.vectors import Points, Vector3
 from ..live.pacing import Stamps
+from ..mesh.reading import Mesh
+from ..mesh.solids import box_surface
 from ..motion.body import Body
 from ..picture.style import BODY_COLOUR
 from ..scene import cdr
@@ -23,10 +25,22 @@ PERIOD_S = 1.0 / 30.0
 """Of the wall clock, between two markers."""
 
 MOST_TRIANGLES = 5000
-"""A marker holds so many, 0.36 MB of them; of a larger mesh it names the file."""
+"""A marker holds so many, 0.36 MB of them; of a larger mesh it names the file, and of larger parts it shows the boxes.
+"""
 
 TRIANGLE_LIST, MESH_RESOURCE, ADD = 11, 10, 0
 """Of visualization_msgs/Marker."""
+
+
+def _boxes_of_parts(mesh: Mesh) -> Points:
+    """Corners (3 k, 3) of the triangles of the box around each part; none of a mesh without parts."""
+    corners, start = [np.empty((0, 3))], 0
+    for part in mesh.parts:
+        end = start + len(part.mesh.vertices)
+        vertices, triangles = box_surface(mesh.vertices[start:end])
+        corners.append(vertices[triangles.ravel()])
+        start = end
+    return np.concatenate(corners)
 
 
 class BodyMarker:
@@ -58,8 +72,10 @@ class BodyMarker:
     def _make(self, body_mesh: BodyMesh, body: Body) -> None:
         """All but stamp and pose. Corners count from the centre of mass, those of a file from the mesh's origin."""
         mesh, com = body_mesh.mesh, body.center_of_mass
-        listed = len(mesh.triangles) <= MOST_TRIANGLES
-        corners = mesh.vertices[mesh.triangles.ravel()] * body.scale - com if listed else np.empty((0, 3))
+        is_small = len(mesh.triangles) <= MOST_TRIANGLES
+        listed = is_small or bool(mesh.parts)
+        shown = mesh.vertices[mesh.triangles.ravel()] if is_small else _boxes_of_parts(mesh)
+        corners = shown * body.scale - com
         self._origin = np.zeros(3) if listed else -com
         layout = cdr.Layout()
         layout.pack("iI", 0, 0)
