@@ -102,7 +102,7 @@ INTERFACES = (
         "~/marker",
         "visualization_msgs/Marker",
         "the mesh at its pose in the world, 30 times a second of the wall clock, for RViz and Foxglove; of more than "
-        "5,000 triangles the address of its file",
+        "5,000 triangles the address of its file, or the boxes of its parts",
     ),
     _topic(
         PUBLISHED,

@@ -14,9 +14,9 @@ from numpy.typing import ArrayLike
 from ..base.errors import InputError, MeshError, TensorError
 from ..base.vectors import FloatArray, IntArray, Matrix3, Points, Triangles, Vector3
 from . import MODEL_COMS
-from .closed_form import given_mass, is_plainly_good, printed_moments, spread_mass
+from .closed_form import is_plainly_good, printed_moments, spread_mass
 from .moments import MODELS, STRETCHED, Moments, mesh_moments
-from .tensor import check_tensor, tensor_from_six
+from .tensor import check_tensor
 from .walls import LIMIT, refused_walls, walls_of_parts, walls_of_surface
 
 SCALE_LIMITS = (1e-9, 1e9)
@@ -206,23 +206,3 @@ class MeshMoments:
             except TensorError as error:
                 raise TensorError(f"inertia_model {model}", f"{self.name}: {error.received}", error.accepted) from None
         return MassProperties(total, center, inertia, warnings)
-
-
-def explicit_mass_properties(
-    mass: float,
-    center_of_mass: ArrayLike,
-    tensor6: Sequence[float],
-    ballast: Sequence[Sequence[float]] = (),
-    scale: ArrayLike = (1.0, 1.0, 1.0),
-) -> MassProperties:
-    """Mass properties from given numbers: mass [kg], center_of_mass (3,) [mesh coordinates], tensor6 (ixx, ixy, ixz,
-    iyy, iyz, izz) [kg m², about the COM]. ``scale`` moves COM and ballast with the mesh; mass and tensor are final.
-    """
-    given = tensor_from_six(tensor6)
-    warnings = check_tensor(given, source="explicit_inertia.tensor")
-    points, center = _checked_ballast(ballast), np.array(center_of_mass, dtype=float)
-    com, inertia, moments, axes = np.empty(3), np.empty((3, 3)), np.empty(3), np.empty((3, 3))
-    total = given_mass(float(mass), center, given, scale_vector(scale), points, com, inertia, moments, axes)
-    if len(points):
-        warnings = check_tensor(inertia, source="explicit_inertia.tensor with ballast")
-    return MassProperties(total, com, inertia, warnings)

@@ -23,7 +23,6 @@ import numpy as np
 
 from ..base.errors import InputError, MeshError, one_of
 from ..base.vectors import FloatArray, IntArray
-from ..base.yaml_text import load_yaml
 from . import INFILL
 from .assembly import Assembly, node_matrix
 
@@ -66,6 +65,8 @@ def read_parts(data: bytes, file: str, load: Callable[[str], Mesh]) -> tuple[Par
     """The parts that a file's bytes tell; load: the mesh that has a name there. Raises MeshError, which says of which
     part what is wrong.
     """
+    from ..base.yaml_text import load_yaml  # which a mesh alone doesn't need
+
     try:
         content = load_yaml(data.decode("utf-8"), file)
     except UnicodeDecodeError:

@@ -10,8 +10,10 @@ from pathlib import Path
 import numpy as np
 
 from ..base.rotation import matrix_from_quaternion, times
-from ..base.vectors import Vector3
+from ..base.vectors import Points, Vector3
 from ..live.pacing import Stamps
+from ..mesh.reading import Mesh
+from ..mesh.solids import box_surface
 from ..motion.body import Body
 from ..picture.style import BODY_COLOUR
 from ..scene import cdr
@@ -23,10 +25,23 @@ PERIOD_S = 1.0 / 30.0
 """Shortest period between two markers [s of wall time]."""
 
 MOST_TRIANGLES = 5000
-"""Largest number of triangles sent in a marker, 0.36 MB; for a larger mesh the marker names the file."""
+"""Largest number of triangles sent in a marker, 0.36 MB. For a larger mesh the marker names the file, and for larger
+parts it shows their boxes.
+"""
 
 TRIANGLE_LIST, MESH_RESOURCE, ADD = 11, 10, 0
 """Constants of visualization_msgs/Marker."""
+
+
+def _boxes_of_parts(mesh: Mesh) -> Points:
+    """Corners (3 k, 3) of the triangles of the box around each part; none of a mesh without parts."""
+    corners, start = [np.empty((0, 3))], 0
+    for part in mesh.parts:
+        end = start + len(part.mesh.vertices)
+        vertices, triangles = box_surface(mesh.vertices[start:end])
+        corners.append(vertices[triangles.ravel()])
+        start = end
+    return np.concatenate(corners)
 
 
 class BodyMarker:
@@ -58,8 +73,10 @@ class BodyMarker:
     def _make(self, body_mesh: BodyMesh, body: Body) -> None:
         """Pack all but stamp and pose. Sent corners are relative to the centre of mass, a file's to the mesh origin."""
         mesh, com = body_mesh.mesh, body.center_of_mass
-        listed = len(mesh.triangles) <= MOST_TRIANGLES
-        corners = mesh.vertices[mesh.triangles.ravel()] * body.scale - com if listed else np.empty((0, 3))
+        is_small = len(mesh.triangles) <= MOST_TRIANGLES
+        listed = is_small or bool(mesh.parts)
+        shown = mesh.vertices[mesh.triangles.ravel()] if is_small else _boxes_of_parts(mesh)
+        corners = shown * body.scale - com
         self._origin = np.zeros(3) if listed else -com
         layout = cdr.Layout()
         layout.pack("iI", 0, 0)

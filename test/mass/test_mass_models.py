@@ -9,7 +9,8 @@ from mass_solids import box, circle, moved, prism
 
 from rigid_proto_ros.base.errors import InputError, MeshError, TensorError
 from rigid_proto_ros.mass.moments import MODELS, mesh_moments
-from rigid_proto_ros.mass.properties import MeshMoments, explicit_mass_properties
+from rigid_proto_ros.mass.properties import MeshMoments
+from rigid_proto_ros.scene.scenario import make_scenario
 
 COMPUTED = ("solid", "shell", "points", "bounding_box")
 
@@ -132,13 +133,20 @@ def test_ballast_far_from_the_origin_keeps_its_digits(lopsided):
     assert far.inertia == pytest.approx(near.inertia, rel=1e-14, abs=1e-14)
 
 
+def explicit(mass, center, tensor, scale, **changes):
+    """The body of given numbers."""
+    given = {"explicit_inertia.mass": mass, "explicit_inertia.center_of_mass": center}
+    values = {"inertia_model": "explicit", "explicit_inertia.tensor": tensor, "scale": scale, **given, **changes}
+    return make_scenario(values).setup.body
+
+
 def test_explicit_numbers_are_final_and_move_with_the_picture():
-    given = (0.2, 0.01, -0.02, 0.3, 0.03, 0.25)
-    plain = explicit_mass_properties(3.0, (1.0, 2.0, 3.0), given, scale=(2.0, -1.0, 1.0))
+    given = [0.2, 0.01, -0.02, 0.3, 0.03, 0.25]
+    plain = explicit(3.0, [1.0, 2.0, 3.0], given, [2.0, -1.0, 1.0])
     assert plain.mass == 3.0
     assert plain.center_of_mass.tolist() == [2.0, -2.0, 3.0]
     assert plain.inertia.tolist() == [[0.2, 0.01, -0.02], [0.01, 0.3, 0.03], [-0.02, 0.03, 0.25]]
-    loaded = explicit_mass_properties(3.0, (0.0, 0.0, 0.0), given, ballast=((1.0, 0.0, 0.0, 4.0),))
+    loaded = explicit(3.0, [0.0, 0.0, 0.0], given, [1.0], **{"ballast.a": [1.0, 0.0, 0.0, 4.0]})
     assert loaded.mass == 4.0
     assert loaded.center_of_mass.tolist() == [0.0, 0.0, 1.0]
     assert loaded.inertia[0, 0] == pytest.approx(0.2 + 3.0 * 1.0 + 1.0 * 9.0)

@@ -115,6 +115,21 @@ def test_the_marker_is_the_mesh_at_its_pose_and_names_the_file_of_a_large_one(mo
     assert [p.x, p.y, p.z] == pytest.approx(origin.tolist(), abs=1e-15)
 
 
+def test_of_large_parts_the_marker_shows_the_boxes(monkeypatch, tmp_path):
+    monkeypatch.setattr(marker, "PERIOD_S", 0.0)
+    monkeypatch.setattr(marker, "MOST_TRIANGLES", 10)
+    (tmp_path / "whole.yaml").write_text("parts: {a: {mesh: hammer}, b: {mesh: book, position: [0.5, 0, 0]}}")
+    run = OfflineRun(make_scenario({"mesh": str(tmp_path / "whole.yaml"), "scale": (1.0, 2.0, 0.5)}))
+    state, mesh = run.simulation.state, run.scenario.body_mesh.mesh
+    told, corners = marked_at(BodyMarker(("map", "tool"), Stamps()).message(run, 0, state.row.tolist()))
+    assert told.type == Marker.TRIANGLE_LIST and len(corners) == 2 * 36
+    vertices = mesh.vertices * [1.0, 2.0, 0.5] - run.simulation.setup.body.center_of_mass
+    count = len(mesh.parts[0].mesh.vertices)
+    for shown, own in ((corners[:36], vertices[:count]), (corners[36:], vertices[count:])):
+        assert shown.min(axis=0) == pytest.approx(own.min(axis=0), abs=1e-15)
+        assert shown.max(axis=0) == pytest.approx(own.max(axis=0), abs=1e-15)
+
+
 def test_markers_are_made_thirty_times_a_second_and_none_without_a_mesh(monkeypatch):
     run, clock = OfflineRun(make_scenario({})), SimpleNamespace(now_s=5.0)
     monkeypatch.setattr(marker, "time", SimpleNamespace(monotonic=lambda: clock.now_s))

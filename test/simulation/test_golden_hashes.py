@@ -29,13 +29,13 @@ from rigid_proto_ros.base.bundled import body_names, example_names, example_path
 from rigid_proto_ros.base.errors import InputError
 from rigid_proto_ros.base.provenance import MOTION
 from rigid_proto_ros.mass.moments import MODELS, Moments
-from rigid_proto_ros.mass.properties import MeshMoments, explicit_mass_properties
+from rigid_proto_ros.mass.properties import MeshMoments
 from rigid_proto_ros.mass.tensor import principal_axes
 from rigid_proto_ros.mesh.reading import load_mesh
 from rigid_proto_ros.motion.integrators import INTEGRATORS
 from rigid_proto_ros.parameters.declarations import Parameters
 from rigid_proto_ros.scene.lessons import lesson
-from rigid_proto_ros.scene.scenario import read_scene
+from rigid_proto_ros.scene.scenario import make_scenario, read_scene
 from rigid_proto_ros.scene.scenario_run import OfflineRun
 from rigid_proto_ros.scene.script import parse_script, read_script
 from rigid_proto_ros.scene.sensor_noise import imu_noise
@@ -247,8 +247,8 @@ def flattened(body: MeshMoments, thickness: float) -> MeshMoments:
     return MeshMoments((body.vertices - 100.0) * (1.0, 1.0, thickness), body.triangles, name="flat")
 
 
-def mass_by_hand() -> str:
-    """The hash of mass properties given in numbers, with ballast and another scale."""
+def bodies_by_hand() -> str:
+    """The hash of bodies given in numbers, with ballast and another scale."""
     found: list[object] = []
     for tensor in ((1.0, 0.0, 0.0, 1.5, 0.0, 2.0), (1.1, 0.2, -0.3, 1.4, 0.1, 1.7), (1e-9, 0.0, 0.0, 1.0, 0.0, 1.0)):
         for ballast in (
@@ -256,8 +256,15 @@ def mass_by_hand() -> str:
             ((0.1, 0.01, 0.02, 0.03),),
             ((0.1, 0.01, 0.02, 0.03), (0.0, 1.0, 1.0, 1.0), (2.0, -0.5, 0.25, 7.0)),
         ):
-            made = explicit_mass_properties(1.7, (0.01, -0.02, 0.3), tensor, ballast, (1.5, 0.5, -2.0))
-            found += [made.mass, made.center_of_mass, made.inertia, *principal_axes(made.inertia), made.warnings]
+            values: dict[str, object] = {
+                "inertia_model": "explicit",
+                "explicit_inertia.mass": 1.7,
+                "scale": (1.5, 0.5, -2.0),
+            }
+            values |= {"explicit_inertia.center_of_mass": (0.01, -0.02, 0.3), "explicit_inertia.tensor": tensor}
+            values |= {f"ballast.b{k}": list(point) for k, point in enumerate(ballast)}
+            setup = make_scenario(values).setup
+            found += [setup.body.row, setup.warnings]
     return digest(*found)
 
 
@@ -308,7 +315,7 @@ def computations() -> dict[str, Callable[[], str]]:
     found["function inverse_tangent_of"] = angles
     found |= {f"mass of {name}": partial(mass_of, name) for name in sorted(body_names())}
     found["mass of 19200 triangles"] = lambda: mass_properties(rounded_cube(40))
-    found["mass given in numbers"] = mass_by_hand
+    found["bodies given in numbers"] = bodies_by_hand
     found |= {f"moments of {name}": partial(moments_of, name) for name in sorted(body_names())}
     found["moments of 19200 triangles"] = lambda: moments(rounded_cube(40))
     found["moments of a thin body"] = lambda: moments(flattened(rounded_cube(6), 1e-7))
