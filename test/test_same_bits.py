@@ -19,7 +19,7 @@ WAYS = [
     *(path for folder in ("base", "motion", "simulation", "scene", "sweep") for path in (ROOT / folder).rglob("*.py")),
     *(
         path
-        for name in ("moments*", "closed_form", "properties", "tensor", "from_mesh", "exact_moments")
+        for name in ("moments*", "closed_form", "properties", "tensor", "walls", "parts", "from_mesh", "exact_moments")
         for path in (ROOT / "mass").glob(f"{name}.py")
     ),
 ]
@@ -43,6 +43,8 @@ ALLOWED = {
     ("simulation/record.py", "sum"): "of bits",
     ("mass/exact_moments.py", "sum"): FRACTIONS,
     ("mass/exact_moments.py", "**"): FRACTIONS,
+    ("mass/parts.py", "sum"): FRACTIONS,
+    ("mass/parts.py", "np.cumsum"): "of whole numbers",
     ("scene/sensor_noise.py", "np.random"): "noise, which moves nothing",
     ("sweep/sampling.py", "**"): "of decimal numbers, whose digits are fixed",
     ("sweep/sampling.py", "np.random"): "whole numbers of Philox, which the golden hashes compare",

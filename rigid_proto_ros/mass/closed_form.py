@@ -233,7 +233,7 @@ def spread_over(
     return total
 
 
-@exported("f8", "f8[:]", "f8[:,:]", "f8[:]", "f8[:,:]", "f8[:]", "f8[:,:]", "f8[:]", "f8[:,:]", returns="f8")
+@njit(error_model="numpy", allocates=False)
 def given_mass(
     mass: float,
     center: Vector3,

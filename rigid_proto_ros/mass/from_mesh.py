@@ -12,6 +12,7 @@ import contextlib
 import dataclasses
 import functools
 import json
+import math
 import os
 from collections.abc import Callable
 from dataclasses import dataclass, replace
@@ -66,8 +67,9 @@ class MeshBody:
     def volume(self, scale: ArrayLike = (1.0, 1.0, 1.0)) -> float:
         """Volume [m³] of the solid, of parts the sum of theirs; raises MeshError where there is none."""
         solid = self.moments.moments("solid")
-        own = sum(part.volume for part in self.parts) if self.parts else solid.measure
-        return float(own * np.prod(np.abs(scale_vector(scale))))
+        own = math.fsum(part.volume for part in self.parts) if self.parts else solid.measure
+        x, y, z = map(abs, scale_vector(scale).tolist())
+        return own * (x * y * z)
 
 
 def mesh_body(mesh: Mesh | str, *, repair: bool = False, fallback: str = "", accept_open: float = 0.0) -> MeshBody:

@@ -227,6 +227,8 @@ SOME = (
     "mesh/test_mesh_verdict.py::test_repair_turns_faces_to_agree",
     "mesh/test_mesh_verdict.py::test_copies_that_close_the_surface_stay_and_those_that_spoil_it_go",
     "mesh/test_mesh_verdict.py::test_a_flat_mesh_is_told_no_remedy_that_does_not_help",
+    "mass/test_walls.py::test_full_infill_is_the_solid",
+    "mass/test_walls.py::test_thickness_infill_and_size_change_in_flight",
     "motion/test_surface.py",
     "identify/test_fitting.py::test_a_poked_throw_tells_all_ten_parameters",
     "sweep/test_sweep_bits.py::test_rows_have_the_bits_of_the_simulation_whatever_chunk_they_are_in[pokes]",
@@ -234,7 +236,8 @@ SOME = (
 )
 """Tests of this suite that call the other kernels: of meshes, sweeps and identification."""
 OTHERS = (
-    *("mass/test_mass_models.py", "mass/test_inertia_tensor.py", "mesh/test_mesh_verdict.py"),
+    *("mass/test_mass_models.py", "mass/test_inertia_tensor.py", "mass/test_walls.py"),
+    *("mesh/test_mesh_verdict.py",),
     *("mesh/test_mesh_formats.py", "motion/test_surface.py", "simulation/test_live_body.py"),
     *("identify/test_fitting.py::test_a_poked_throw_tells_all_ten_parameters", "sweep/test_sweep_bits.py"),
 )

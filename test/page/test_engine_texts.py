@@ -16,7 +16,8 @@ from rigid_proto_ros.base.bundled import PACKAGE_FOLDER, body_names
 from rigid_proto_ros.cli.main import main
 from rigid_proto_ros.mass.engines import FORMS, engine_text
 from rigid_proto_ros.mass.from_mesh import mesh_body
-from rigid_proto_ros.mass.properties import explicit_mass_properties
+from rigid_proto_ros.mass.properties import MassProperties
+from rigid_proto_ros.scene.scenario import make_scenario
 
 BODIES: list[dict[str, Any]] = [
     *({"mesh": name, "density": 7850.0} for name in body_names()),
@@ -90,5 +91,6 @@ def test_numbers_of_ones_own_are_written_as_python_has_them(page_file: Path) -> 
     own["explicit_inertia.center_of_mass"] = center
     found = answered(page_file, [({**own, "explicit_inertia.tensor": tensor}, None) for tensor in TENSORS])
     for tensor, texts in zip(TENSORS, found, strict=True):
-        properties = explicit_mass_properties(2.0, center, tensor, scale=(2.0, 2.0, 2.0))
+        body = make_scenario({**own, "explicit_inertia.tensor": tensor}).setup.body
+        properties = MassProperties(body.mass, body.center_of_mass, body.inertia)
         assert texts == {engine: engine_text(engine, properties) for engine in FORMS}, tensor

@@ -160,6 +160,8 @@ EVERYTHING = {
     "scale": [1.1, 0.9, 1.2],
     "mass": 0.2,
     "density": 900.0,
+    "wall_thickness": 5e-4,
+    "infill": 0.3,
     "explicit_inertia": {
         "mass": 0.3,
         "center_of_mass": [0.01, 0.02, 0.03],
@@ -195,6 +197,7 @@ EVERYTHING = {
 
 ONLY_WITH = {
     "density": {"mass": 0.0},
+    **dict.fromkeys(("wall_thickness", "infill"), {"inertia_model": "walled"}),
     **{f"explicit_inertia.{own}": {"inertia_model": "explicit"} for own in EVERYTHING["explicit_inertia"]},
     "step": {"integrator": "rk4"},
     "string.stiffness": {"string": {**EVERYTHING["string"], "frequency": 0.0}},

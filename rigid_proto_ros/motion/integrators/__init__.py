@@ -11,7 +11,7 @@ Python's division would raise an exception in the middle of it.
 
 from __future__ import annotations
 
-from ...base.errors import CommandRefused, InputError
+from ...base.errors import CommandRefused
 from .. import integrators
 from .integrator import Integrator
 
@@ -26,10 +26,3 @@ def check_supported(integrator: Integrator, needs: frozenset[str]) -> None:
         able = ", ".join(name for name, other in INTEGRATORS.items() if not other.lacks(needs))
         wanted = " and ".join(sorted(needs))
         raise CommandRefused("integrator", "integrator", integrator.name, f"one that supports {wanted}: {able}")
-
-
-def integrator_named(name: str) -> Integrator:
-    """The integrator of this name; raises InputError listing the names that exist."""
-    if name not in INTEGRATORS:
-        raise InputError("integrator", name, ", ".join(INTEGRATORS))
-    return INTEGRATORS[name]
