@@ -19,18 +19,18 @@ from ..base.errors import InputError
 from ..base.interrupts import end_with_this_thread, with_this_package
 
 GRACE_S = 5.0
-"""A process that doesn't end within this time after SIGTERM is killed."""
+"""Time from SIGTERM to SIGKILL for a process that doesn't end [s]."""
 
 CONFIRM_S = 2.0
-"""How long the node goes on at least after the last command: the client waits for its confirmation."""
+"""Least time that the node runs after the last command [s]: the client waits for its confirmation."""
 
 OUT = Path("out")
 
 SPIN = 4.0
-"""rad/s about the middle axis: a flip or two in ten seconds for most bodies."""
+"""Spin about the intermediate axis [rad/s]: one or two flips in ten seconds for most bodies."""
 
 DRIFT = 0.12
-"""Body diagonals a second that the push at the COM gives: it stays in the picture."""
+"""Speed that the push at the COM gives [body diagonals per second]: the body stays in the picture."""
 
 EXAMPLES = (
     ("rigid_proto demo", "the bundled T-handle, poked, 10 s"),
@@ -55,7 +55,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 
 def run(args: argparse.Namespace) -> int:
-    """Run node and client, and print a summary of the recording."""
+    """Run node and client and print a summary of the recording."""
     from ..base.bundled import example_path, scene_path
     from ..ros.domain import DOMAINS, hold_domain
     from ..scene.script import read_script
@@ -68,12 +68,12 @@ def run(args: argparse.Namespace) -> int:
     scene, script = write_demo(named) if named else (scene_path("t_handle"), example_path("flip_and_poke"))
     for file in (session, view):
         file.unlink(missing_ok=True)
-    # The last command has its time to act, and to be confirmed.
+    # Time for the last command to act and to be confirmed.
     until_s = max(args.duration, read_script(script)[-1].stamp_ns * 1e-9 + CONFIRM_S)
     print(f"rigid_body_node with {scene}, poke_client with {script}: {until_s:g} s", flush=True)
     with contextlib.ExitStack() as processes:
         environment = with_this_package()
-        # A separate ROS domain keeps out the pokes of another demo, or for another node.
+        # A separate ROS domain keeps this demo's pokes from other nodes, and those of others from this one.
         held = None if os.environ.get("ROS_DOMAIN_ID") else hold_domain(DOMAINS)
         if held is not None:
             environment["ROS_DOMAIN_ID"] = str(held[0])
@@ -106,7 +106,7 @@ def _start(command: list[str], environment: dict[str, str], processes: contextli
 
 
 def _end(process: subprocess.Popen[bytes]) -> None:
-    """Send SIGTERM, which ends Python silently if it has no handler yet, and after a while SIGKILL."""
+    """Send SIGTERM, which ends Python silently if it has no handler yet, and SIGKILL after GRACE_S."""
     process.terminate()
     try:
         process.wait(GRACE_S)
@@ -116,10 +116,10 @@ def _end(process: subprocess.Popen[bytes]) -> None:
 
 
 def write_demo(name: str) -> tuple[Path, Path]:
-    """Write demo_pokes.yaml for a scene or a mesh, and for a mesh demo_scene.yaml; returns both paths.
+    """Write demo_pokes.yaml for a scene or a mesh, and for a mesh also demo_scene.yaml. Returns both paths.
 
-    A mesh alone spins about an axis close to its intermediate principal axis; pokes act at the COM and at the vertex
-    farthest from the COM. Raises InputError for what can't be simulated.
+    A mesh without a scene spins about an axis close to its intermediate principal axis. Pokes act at the COM and at the
+    vertex farthest from the COM. Raises InputError for a body that can't be simulated.
     """
     import numpy as np
 
@@ -133,13 +133,13 @@ def write_demo(name: str) -> tuple[Path, Path]:
     body, surface = scenario.setup.body, scenario.setup.surface
     if surface is None:
         raise InputError("demo", name, "a mesh, or a scene that has one")
-    used = np.unique(surface.triangles)  # a vertex that no triangle uses is no part of the body
+    used = np.unique(surface.triangles)  # without vertices that no triangle uses
     points = surface.vertices[used] - body.center_of_mass
     farthest = int(used[np.argmax((points * points).sum(axis=1))])
     diagonal = float(np.linalg.norm(surface.extent))
     spin = SPIN * (body.principal_axes[:, 1] + 0.02 * body.principal_axes[:, 0] + 0.02 * body.principal_axes[:, 2])
     push = body.mass * DRIFT * diagonal
-    # A torque that would turn the body by its own spin in a second, about its stiffest axis.
+    # In its 1 s this torque changes the spin by at most SPIN / 2, about the axis of the smallest moment.
     torque = 0.5 * SPIN * float(body.principal_moments[0])
     script = [
         {"t": 1.0, "at": "com", "impulse": [push, 0.0, 0.0]},
@@ -156,7 +156,7 @@ def write_demo(name: str) -> tuple[Path, Path]:
 
 
 def _report(session: Path, view: Path) -> int:
-    """Print a summary that is read from the recording."""
+    """Print a summary of the recording."""
     from ..session.bag import read_runs
     from .executables import as_typed
 

@@ -1,9 +1,9 @@
 # SPDX-License-Identifier: MIT
-"""What the installed executables start: where a package is missing that each of them needs, one line says what to
+"""Entry points of the installed executables. If a required package is missing, they print one line that says what to
 install.
 
-Nothing of ours but this is imported before that is known, and before a signal ends the process quietly.
-`python -m rigid_proto_ros.cli.executables PROGRAM ...` starts them, too.
+Until that is checked and signals end the process quietly, no other module of this package but base/interrupts.py is
+imported. `python -m rigid_proto_ros.cli.executables PROGRAM ...` starts the executables, too.
 """
 
 from __future__ import annotations
@@ -17,29 +17,29 @@ import sys
 from ..base import interrupts
 
 NUMERICS = {"numpy": "numpy", "yaml": "PyYAML"}
-"""Packages without which nothing runs, by the names that they are imported by."""
+"""Required packages by import name."""
 
 
 def rigid_proto() -> int:
-    """The command line."""
+    """Run the command line."""
     return _start("rigid_proto", "cli.main")
 
 
 def rigid_body_node() -> int:
-    """The node, which ends when it is asked to: launch reports any other status than 0 as a death."""
+    """Run the node. After a signal its exit status is 0: launch reports any other status as a crash."""
     return _start("rigid_body_node", "ros.main", needs_ros=True, interrupted=0)
 
 
 def poke_client() -> int:
-    """The client that sends scripts and single commands."""
+    """Run the client that sends scripts and single commands."""
     return _start("poke_client", "ros.poke_client", needs_ros=True)
 
 
 def _start(program: str, module: str, needs_ros: bool = False, interrupted: int | None = None) -> int:
-    """Import and run a program. interrupted: its exit status after a signal; None: 128 + the signal's number."""
+    """Import and run a program. interrupted: its exit status after a signal; None for 128 + the signal's number."""
     interrupts.end_at_once(interrupted)
     for name in ("stdin", "stdout", "stderr"):
-        if getattr(sys, name) is None:  # closed, as by 2>&-: the next file that is opened would get its number
+        if getattr(sys, name) is None:  # closed, as by 2>&-: the next file opened would get its descriptor
             stream = open(os.devnull, "r" if name == "stdin" else "w")  # noqa: SIM115 (until the end)
             os.set_inheritable(stream.fileno(), True)
             setattr(sys, name, stream)
@@ -50,7 +50,7 @@ def _start(program: str, module: str, needs_ros: bool = False, interrupted: int 
     package = __package__.rpartition(".")[0]
     try:
         status = importlib.import_module(f"{package}.{module}").main()
-    except MemoryError:  # while modules are imported; what a program runs says so itself
+    except MemoryError:  # during imports; the program itself reports it later
         print(f"{program}: out of memory", file=sys.stderr)
         return 2
     interrupts.done()
@@ -58,7 +58,7 @@ def _start(program: str, module: str, needs_ros: bool = False, interrupted: int 
 
 
 def _remedy(needs_ros: bool) -> str:
-    """What is missing and how it comes, in one line; empty when all is there."""
+    """One line that says what is missing and how to install it; empty if nothing is."""
     missing = [name for module, name in NUMERICS.items() if importlib.util.find_spec(module) is None]
     if missing:
         return (
@@ -74,7 +74,7 @@ def _remedy(needs_ros: bool) -> str:
 
 
 def check_rclpy(field: str) -> None:
-    """Raise InputError where rclpy isn't found."""
+    """Raises InputError if rclpy isn't installed."""
     from ..base.errors import InputError, is_missing
 
     if importlib.util.find_spec("rclpy") is None:
@@ -83,17 +83,15 @@ def check_rclpy(field: str) -> None:
 
 
 def own_executable(name: str) -> list[str]:
-    """How to start one of this package's executables with the interpreter and packages of this process. Raises
-    InputError where they lack ROS.
+    """Command that starts an executable of this package with the interpreter and packages of this process. Raises
+    InputError if ROS isn't among them.
     """
     check_rclpy(name)
     return [sys.executable, "-P", "-m", "rigid_proto_ros.cli.executables", name]
 
 
 def as_typed(name: str) -> str:
-    """What starts an executable of this environment in the user's shell: its name, or its path where PATH doesn't have
-    it.
-    """
+    """What a user types to start an executable of this environment: its name, or its path if it isn't on PATH."""
     import shutil
     from pathlib import Path
 
@@ -104,7 +102,9 @@ def as_typed(name: str) -> str:
 
 
 def text_parameter(name: str, text: str) -> list[str]:
-    """ROS arguments that give the node a text. Quoted: they are read as YAML, where ``part #2.obj`` is ``part``."""
+    """ROS arguments that set a text parameter of the node. Quoted, because values are parsed as YAML, where ``part
+    #2.obj`` is ``part``.
+    """
     return ["-p", f"{name}:={json.dumps(text, ensure_ascii=False)}"]
 
 

@@ -17,7 +17,7 @@ if TYPE_CHECKING:
 
 
 class Export(NamedTuple):
-    """endings: extensions of the file's name. needs: a module that its writer imports, and the package that has it."""
+    """An export. endings: its file extensions. needs: a module that its writer imports, and the package to install."""
 
     endings: tuple[str, ...]
     help: str
@@ -34,11 +34,11 @@ EXPORTS = {
         ("pxr", "usd-core"),
     ),
 }
-"""By option what it writes; ``write_exports`` calls the writers."""
+"""Exports by option; ``write_exports`` calls the writers."""
 
 TABLES = ("csv", "parquet")
 ANIMATIONS = ("gltf", "usd")
-"""Options to which ``--fps`` applies; tables have the states of publications."""
+"""Options to which ``--fps`` applies. Tables have the states of publications."""
 
 DEFAULT_FPS = 30.0
 
@@ -62,7 +62,7 @@ def asked(args: argparse.Namespace) -> dict[str, str]:
 
 
 def check_exports(args: argparse.Namespace) -> None:
-    """Check before any work that the files can be written; raises InputError."""
+    """Check before any work that the files can be written. Raises InputError."""
     files = asked(args)
     for name, file in files.items():
         endings, _, (module, package) = EXPORTS[name]
@@ -78,7 +78,7 @@ def check_exports(args: argparse.Namespace) -> None:
 def write_exports(
     args: argparse.Namespace, record: FlightRecord, source: Source | None, say: Callable[[str], None]
 ) -> None:
-    """Write the requested files, and ``say`` one line for each; raises InputError."""
+    """Write the requested files and ``say`` one line for each. Raises InputError."""
     files = asked(args)
     if set(TABLES) & set(files):
         from ..export import table

@@ -1,5 +1,7 @@
 # SPDX-License-Identifier: MIT
-"""``rigid_proto identify``: mass properties from recorded motion, and which of them the motion identifies."""
+"""``rigid_proto identify``: estimate mass properties from recorded motion, and say which of them the motion
+determines.
+"""
 
 from __future__ import annotations
 
@@ -27,7 +29,7 @@ EXAMPLES = (
     ),
 )
 SENSORS = {"pose": "[@CHILD]", "imu": "", "wrench": "[@FRAME]"}
-"""Topics of which a bag may have several, and what may follow their names."""
+"""Options that choose among several topics of a bag, and what may follow the topic's name."""
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -58,7 +60,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 
 def run(args: argparse.Namespace) -> int:
-    """Read the recordings, estimate, and print the result."""
+    """Read the recordings, estimate the mass properties and print them."""
     try:
         from ..identify.identification import Known, as_json, as_text, as_urdf, identify
     except ImportError as error:
@@ -123,7 +125,7 @@ def _flights(names: list[str], choice: Choice) -> tuple[list[MeasuredFlight], li
 
 
 def _has_scene(path: Path) -> bool:
-    """Whether a bag contains a scene, as those recorded by this package do."""
+    """Whether a bag contains a scene, as recordings of this package do."""
     from ..session.bag import has_scene
 
     return path.suffix != ".db3" and not (path.is_dir() and any(path.glob("*.db3"))) and has_scene(path)

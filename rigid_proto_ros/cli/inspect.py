@@ -21,7 +21,7 @@ from .inspect_report import print_inertial, print_report
 from .inspect_robot import add_robot_arguments, compare, given, lump
 
 DENSITY = 1000.0
-"""kg/m³, that of water, if neither density nor mass is given."""
+"""Density if neither density nor mass is given: that of water [kg/m³]."""
 VERIFIED = 1e-13
 """Largest error against rational arithmetic that ``--verify`` accepts."""
 
@@ -33,7 +33,7 @@ NEEDS = {
     "package-path": "--compare ROBOT or --lump ROBOT",
     "as-scene": "--lump ROBOT",
 }
-"""Options that are for robots alone, and what they go with."""
+"""Options for robots only, and the options that they need."""
 
 EXAMPLES = (
     ("rigid_proto inspect hammer --density 7850", "mass, COM, inertia and problems of the mesh"),
@@ -112,7 +112,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 
 def run(args: argparse.Namespace) -> int:
-    """Inspect, print, and return the exit status; raises InputError for what is refused."""
+    """Inspect, print and return the exit status. Raises InputError for refused input."""
     texts = args.mesh
     args.mesh = _one(args) if args.lump or args.compare else None
     if args.lump is not None:
@@ -139,7 +139,7 @@ def run(args: argparse.Namespace) -> int:
 
 
 def _one(args: argparse.Namespace) -> str | None:
-    """The one mesh that there may be beside a robot."""
+    """The mesh given beside a robot, if any. Raises InputError for more than one."""
     if len(args.mesh) > 1:
         option = "lump" if args.lump else "compare"
         raise InputError("MESH", " ".join(args.mesh), f"at most one with --{option}; several are the parts of one body")
@@ -147,7 +147,7 @@ def _one(args: argparse.Namespace) -> str | None:
 
 
 def _inspection(args: argparse.Namespace, texts: list[str]) -> Inspection | None:
-    """The inspection of a mesh or of parts; None where a link of a robot is among them. Raises InputError."""
+    """The inspection of a mesh or of parts; None if one of them is a link of a robot. Raises InputError."""
     if not any(texts):
         raise InputError("MESH", "missing: give a path, a package:// URI or a bundled name, or --compare ROBOT")
     for name, value in (("mass", args.mass), ("density", args.density)):
@@ -189,7 +189,7 @@ def _print(inspection: Inspection, report: dict[str, Any], args: argparse.Namesp
 
 
 def _verify(inspection: Inspection, report: dict[str, Any]) -> int:
-    """Add ``verification`` to the report, null if it is refused; returns the exit status."""
+    """Add ``verification`` to the report, null if it is refused. Returns the exit status."""
     report["verification"] = None
     report["verification"] = verify_moments(inspection.body, inspection.scale)
     if max(report["verification"].values()) <= VERIFIED:

@@ -1,6 +1,6 @@
 # SPDX-License-Identifier: MIT
-"""``rigid_proto inspect PART PART ...``: parts named on the command line as one body, with a link of a robot among them
-if there is a payload to be added to it.
+"""``rigid_proto inspect PART PART ...``: parts given on the command line as one body. One of them may be a link of a
+robot, to which the others are added as a payload.
 """
 
 from __future__ import annotations
@@ -26,7 +26,7 @@ ROBOTS = (".urdf", ".sdf", ".xml", ".xacro", ".world")
 
 
 def split_part(text: str) -> tuple[str, str]:
-    """A mesh's name and what stands behind its last ``=``; nothing where the whole is the name of a file."""
+    """Name of a mesh, and the text after its last ``=``; empty if the whole text is the name of a file."""
     name, sign, material = text.rpartition("=")
     if not sign or Path(text).is_file():
         return text, ""
@@ -34,8 +34,8 @@ def split_part(text: str) -> tuple[str, str]:
 
 
 def mesh_of_texts(texts: Sequence[str], density: float, scale: Sequence[float] | None) -> Mesh:
-    """The body of the parts that are told as MESH, MESH=density or MESH=mass:kg; density [kg/m³]: of those that tell
-    none; scale: of every mesh. Raises InputError.
+    """The body of parts given as MESH, MESH=density or MESH=mass:kg. density: of parts that give none [kg/m³]. scale:
+    of every mesh. Raises InputError.
     """
     parts: list[Part] = []
     for text in texts:
@@ -57,13 +57,13 @@ def mesh_of_texts(texts: Sequence[str], density: float, scale: Sequence[float] |
 
 
 def is_link(text: str) -> bool:
-    """Whether this is a link of a robot file, as FILE#LINK."""
+    """Whether a text names a link of a robot file, as FILE#LINK."""
     file, sign, _ = text.rpartition("#")
     return bool(sign) and Path(file).suffix.lower() in ROBOTS and not Path(text).is_file()
 
 
 def with_link(args: argparse.Namespace, all_texts: Sequence[str]) -> int:
-    """Print a link with what is fixed to it as one body, in the link's frame; returns the exit status."""
+    """Print a link and the parts fixed to it as one body, in the link's frame. Returns the exit status."""
     from ..robots.link_shapes import combined
     from ..robots.reading import check_inertial, read_robot
 

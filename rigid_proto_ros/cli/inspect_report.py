@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""What ``rigid_proto inspect`` prints for people."""
+"""The text that ``rigid_proto inspect`` prints."""
 
 from __future__ import annotations
 
@@ -28,7 +28,7 @@ def table(rows: Iterable[Sequence[str]], head: Sequence[str] = ()) -> None:
 
 
 def print_report(inspection: Inspection, report: dict[str, Any]) -> None:
-    """The report on stdout: mesh, findings, mass properties, models."""
+    """Print the report: mesh, findings, mass properties, models."""
     body, chosen = inspection.body, inspection.chosen
     count = report["components"]
     state = [
@@ -93,7 +93,7 @@ def _print_models(inspection: Inspection) -> None:
 
 
 def row_of(values: Iterable[float], largest: float = 0.0) -> str:
-    """Numbers side by side, in six digits; what rounding leaves beside the ``largest`` is 0."""
+    """Numbers with six digits in a row; rounding errors relative to ``largest`` are printed as 0."""
     return " ".join(f"{without_rounding(value, largest):< 13.6g}" for value in values).rstrip()
 
 
@@ -105,9 +105,7 @@ def tensor_rows(inertia: Matrix3) -> list[tuple[str, ...]]:
 
 
 def print_inertial(args: argparse.Namespace, properties: MassProperties) -> bool:
-    """Print the <inertial>, or the text for an engine, that the command's options ask for; False where they ask for
-    none.
-    """
+    """Print the <inertial>, or the text for an engine, that the options ask for. Returns False if they ask for none."""
     if args.engine is not None:
         print(engine_text(args.engine, properties), end="")
         return True

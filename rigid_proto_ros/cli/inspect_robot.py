@@ -52,22 +52,22 @@ def add_robot_arguments(parser: argparse.ArgumentParser) -> None:
 
 
 def given(args: argparse.Namespace, name: str) -> bool:
-    """Whether an option was given, also as 0."""
+    """Whether an option was given, even as 0."""
     value = getattr(args, {"for": "engine"}.get(name, name.replace("-", "_")))
     return value is not None and value is not False
 
 
 def _refuse(args: argparse.Namespace, use: str, *names: str) -> None:
-    """Refuse options that have no meaning for robots."""
+    """Raises InputError for options that have no meaning for robots."""
     for name in names:
         if given(args, name):
             raise InputError(f"--{name}", f"can't be used with --{use}, which takes what the robot's file says")
 
 
 def compare(args: argparse.Namespace) -> int:
-    """``inspect [MESH] --compare ROBOT...``: 1 if a link's inertial is wrong, otherwise 0; with a mesh or a tolerance
-    also 1 if an inertial differs from that of the uniform solid, or if nothing could be compared; with --strict also
-    if a link is unknown.
+    """Run ``inspect [MESH] --compare ROBOT...``. Exit status: 1 if a link's inertial is wrong, otherwise 0. With a mesh
+    or a tolerance also 1 if an inertial differs from that of the uniform solid, or if nothing could be compared. With
+    --strict also 1 if a link is unknown.
     """
     _check_options(args)
     _tell_what_is_left_out()
@@ -84,7 +84,7 @@ def compare(args: argparse.Namespace) -> int:
             print(f"{robot}:")
         try:
             found.append(_judge(args, robot))
-        except InputError as error:  # the other robots are checked nevertheless
+        except InputError as error:  # reported; the other robots are still checked
             print(f"rigid_proto inspect: {robot}: {' '.join(str(error).split())}", file=sys.stderr)
             found.append((2, {"compare": robot, "links": None, "refused": str(error)}))
     if args.json:
@@ -93,7 +93,7 @@ def compare(args: argparse.Namespace) -> int:
 
 
 def _check_options(args: argparse.Namespace) -> None:
-    """Refuse options that ``--compare`` doesn't go with, or that need another one."""
+    """Raises InputError for options that can't be combined with ``--compare`` or that need another one."""
     _refuse(args, "compare", "lump", "as-scene", "verify", "urdf", "sdf", "mjcf", "for", "model", "ballast", "mass")
     _refuse(args, "compare", "repair", "fallback")
     if args.scale and not args.mesh:
@@ -136,7 +136,7 @@ def _judge(args: argparse.Namespace, robot: str) -> tuple[int, dict[str, Any]]:
     close = args.mesh is not None or args.tolerance is not None
     counted = (*WRONG, *([NOT_UNIFORM] if close else []), *([UNKNOWN] if args.strict else []))
     with_shapes = [d for d in diagnoses if d.mesh]
-    # A comparison of nothing must not look like one that found nothing.
+    # If nothing could be compared, the status must not be that of a comparison without findings.
     nothing = close and with_shapes and all(d.status in (UNKNOWN, NOT_JUDGED) for d in with_shapes)
     status = 1 if nothing or any(d.status in counted for d in diagnoses) else 0
     return status, {"compare": robot, "links": [d.as_dict() for d in diagnoses]}
@@ -166,7 +166,7 @@ def _print_diagnoses(diagnoses: list[LinkDiagnosis]) -> None:
 
 
 def _fix(args: argparse.Namespace) -> int:
-    """Write OUT; 0 when no link's inertial is wrong any longer, otherwise 1."""
+    """Write OUT. Returns 0 if no inertial is wrong any longer, otherwise 1."""
     from ..robots.diagnosis import WRONG
     from ..robots.fix import fix_robot
 
@@ -198,7 +198,7 @@ def _fix(args: argparse.Namespace) -> int:
 
 
 def lump(args: argparse.Namespace) -> int:
-    """``inspect --lump ROBOT``: print the robot as one body, and write it as a scene if asked for."""
+    """Run ``inspect --lump ROBOT``: print the robot as one body, and write it as a scene if requested."""
     from ..robots.composite_inertia import lump_robot
 
     _refuse(
@@ -258,7 +258,7 @@ def _print_lump(whole: Lump, written: tuple[str, ...]) -> None:
 
 
 def _write_scene(whole: Lump, name: str) -> tuple[str, ...]:
-    """Write the scene, and in its folder the mesh, which is only drawn; returns the names of the files."""
+    """Write the scene, and the mesh, which is only drawn, into the same folder. Returns the names of the files."""
     from ..robots.composite_inertia import obj_text
     from ..scene.scenario import scene_text
 

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""``rigid_proto lesson``: the page as one file that opens in a lesson, or in which a mesh flies."""
+"""``rigid_proto lesson``: write the page as one file that opens in a lesson or with a given mesh in flight."""
 
 from __future__ import annotations
 

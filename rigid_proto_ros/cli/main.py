@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""``rigid_proto``: one console command; each of its commands is a module of this folder.
+"""``rigid_proto``: the console command. Each of its commands is a module of this folder.
 
 Exit status: 0 success, 1 a check failed, 2 the input was refused (one line on stderr), 130 ended by Ctrl-C (143 by
 SIGTERM).
@@ -37,10 +37,10 @@ EXAMPLES = (
 
 
 class ShowVersion(argparse.Action):
-    """Option that prints the package's version, which is looked up only then."""
+    """Option that prints the package's version, which is only then looked up."""
 
     def __call__(self, parser: argparse.ArgumentParser, *_: object) -> None:
-        """Print it and exit."""
+        """Print the version and exit."""
         from .. import __version__
 
         print(__version__)
@@ -60,7 +60,7 @@ def main(argv: list[str] | None = None) -> int:
     subparsers = parser.add_subparsers(dest="command", metavar="COMMAND", required=True, parser_class=Parser)
     for name, summary in COMMANDS.items():
         command = subparsers.add_parser(name, help=summary, description=f"{summary[0].upper()}{summary[1:]}.")
-        # Only the command that runs is imported, so that each starts as fast as possible.
+        # Only the command that runs is imported, so that each starts fast.
         if argv and argv[0] == name:
             module = importlib.import_module(f".{name}", __package__)
             module.add_arguments(command)
@@ -70,8 +70,8 @@ def main(argv: list[str] | None = None) -> int:
     program = f"rigid_proto {args.command}"
     if own_process:
         if isinstance(sys.stdout, io.TextIOWrapper):
-            sys.stdout.reconfigure(errors="backslashreplace")  # of what the terminal's encoding doesn't have
-        # All commands need this module, and during its import there is nothing to close yet.
+            sys.stdout.reconfigure(errors="backslashreplace")  # for characters that the terminal's encoding lacks
+        # All commands need this module. It is imported here because an interrupt now finds nothing to close.
         importlib.import_module("..base.compilation", __package__)
         return interrupts.run(lambda: _run(args), lambda error: tell(program, error))
     try:
@@ -85,5 +85,5 @@ def main(argv: list[str] | None = None) -> int:
 def _run(args: argparse.Namespace) -> int:
     """Run the command."""
     status = int(args.run(args))
-    print(end="", flush=True)  # inside _run, so that an output that can't be written is reported like any file
+    print(end="", flush=True)  # inside _run, so that an output that can't be written is reported as for any file
     return status

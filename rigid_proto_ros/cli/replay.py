@@ -69,7 +69,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 
 def run(args: argparse.Namespace) -> int:
-    """Print a summary of the session, and carry out the options."""
+    """Print a summary of the session and carry out the options."""
     if args.at is not None and args.as_scene is None:
         raise InputError("--at", "needs --as-scene FILE.yaml")
     if args.speed is not None and args.publish != "states":
@@ -102,7 +102,7 @@ def run(args: argparse.Namespace) -> int:
 
 
 def _check_place(option: str, file: str | None, session: str, check: Callable[[str, str], None]) -> None:
-    """Check before long work that a file can be written, and that it isn't the session."""
+    """Check before long work that a file can be written and that it isn't the session."""
     if file and is_same_file(file, session):
         raise InputError(option, file, "another file than the session")
     if file:
@@ -165,7 +165,7 @@ def _export(runs: list[RecordedSession], args: argparse.Namespace, given: Scenar
 
 
 def _print_difference(difference: Difference, session: RecordedSession) -> None:
-    """Print the last command before a difference, and how recording and present environment differ."""
+    """Print the last command before a difference, and how the environments of recording and replay differ."""
     from ..session.check import made_with_table
 
     if difference.command:
@@ -179,8 +179,8 @@ def _print_difference(difference: Difference, session: RecordedSession) -> None:
 
 
 def _given_scene(path: str | None, session: RecordedSession) -> Scenario | None:
-    """The scene in this file, given for a session without a scene; None if no file is given. Raises InputError if the
-    session is complete without it.
+    """The scene in a file that is given for a session without a scene; None without a file. Raises InputError if the
+    session has its own scene.
     """
     if not path:
         return None

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""``rigid_proto simulate``: a scene, and a poke script, without ROS."""
+"""``rigid_proto simulate``: simulate a scene and a poke script without ROS."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ if TYPE_CHECKING:
 
 DURATION_NS = 10_000_000_000
 AFTER_SCRIPT_NS = 1_000_000_000
-"""Duration without --duration, and the least time after a script's last command [ns]."""
+"""Duration without --duration, and least time after a script's last command [ns]."""
 
 EXAMPLES = (
     ("rigid_proto simulate t_handle", "the bundled T-handle, 10 s"),
@@ -69,7 +69,7 @@ def add_arguments(parser: Parser) -> None:
 
 
 def _instead_of(option: str) -> str:
-    """A hint for a parameter that was given as an option."""
+    """Hint for a parameter that was given as an option."""
     from ..parameters.declarations import PARAMETERS
 
     name = option.removeprefix("--").replace("-", "_")
@@ -77,7 +77,7 @@ def _instead_of(option: str) -> str:
 
 
 def run(args: argparse.Namespace) -> int:
-    """Run the scene and print its end."""
+    """Run the scene and print its final state."""
     from ..rerun_view.recorders import make_recorders
     from ..scene.scenario import read_scene
     from ..scene.scenario_run import OfflineRun, run_with_progress, summary
@@ -107,7 +107,7 @@ def run(args: argparse.Namespace) -> int:
         for recorder in recorders:
             closing.callback(recorder.close)
         watching = [*recorders, *filter(None, [record])]
-        # The ghost is simulated only if something is recorded.
+        # The ghost is simulated only for a recording.
         flight = OfflineRun(scenario, script, Observers(*watching) if watching else None)
         wall_time = run_with_progress(flight, duration_ns)
         result = summary(flight, wall_time)
@@ -132,12 +132,12 @@ def run(args: argparse.Namespace) -> int:
     if flight.simulation.failure:
         _warn(f"stopped in the last good state: {flight.simulation.failure}")
         return 1
-    # A recording that stopped has already printed a message.
+    # A recording that stopped has already printed why.
     return 2 if recorded != files else 1 if flight.simulation.refused else 0
 
 
 def _check(scenario: Scenario, script: list[Command], args: argparse.Namespace, files: list[str]) -> None:
-    """Check everything that can be refused now, before a recording of an earlier run is overwritten."""
+    """Check all that can be refused now, before the recording of an earlier run is overwritten."""
     from ..scene.scenario_run import OfflineRun
     from ..scene.sensitivity import finer
 
@@ -149,7 +149,7 @@ def _check(scenario: Scenario, script: list[Command], args: argparse.Namespace, 
 
 
 def _moved(attitude: float | None, position: float, wall_time: float, **finer: float) -> str:
-    """How far the end moves, in a line."""
+    """One line on the sensitivity of the final state."""
     (name, value), *_ = ((name, value) for name, value in finer.items() if name in ("accuracy", "step"))
     with_it = f"with {name} {value:g} ({wall_time:.3g} s of wall time)"
     if attitude is None:
@@ -158,7 +158,7 @@ def _moved(attitude: float | None, position: float, wall_time: float, **finer: f
 
 
 def _setting(text: str) -> tuple[str, object]:
-    """``name=value`` with the value typed as on a ROS command line."""
+    """Parse ``name=value``, with the value typed as on a ROS command line."""
     from ..base.yaml_text import scalar
 
     name, equals, value = text.partition("=")
@@ -168,7 +168,7 @@ def _setting(text: str) -> tuple[str, object]:
 
 
 def _recorded(scenario: Scenario, args: argparse.Namespace, set_by_option: bool) -> list[str]:
-    """The files to record to, all of which can be written; raises InputError."""
+    """The files to record to, checked to be writable. Raises InputError."""
     from ..rerun_view.recorders import recording_names
     from ..scene.scene_file import check_record
 

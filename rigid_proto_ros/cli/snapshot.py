@@ -31,8 +31,8 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 
 def run(args: argparse.Namespace) -> int:
-    """Write the picture; raises InputError for a request that is refused."""
-    # Pillow comes with Rerun.
+    """Write the picture. Raises InputError for a request that is refused."""
+    # Rerun installs Pillow.
     for module, package in (("rerun", "rerun-sdk"), ("PIL", "pillow")):
         if importlib.util.find_spec(module) is None:
             raise InputError("snapshot", is_missing(package, "rerun"))
@@ -42,7 +42,7 @@ def run(args: argparse.Namespace) -> int:
 
     size = _pixels(args.size, 200)
     session = read_runs(args.session)[-1]
-    # What is refused is refused before the long work.
+    # Refuse before the long work.
     _check_time(session.states, args.at)
     check_picture(args.output)
     with tempfile.TemporaryDirectory() as folder:
@@ -56,7 +56,7 @@ def run(args: argparse.Namespace) -> int:
 
 
 def _check_time(states: States, at_s: float) -> None:
-    """Raise InputError unless there are states around ``at_s``."""
+    """Raises InputError unless there are states around ``at_s``."""
     if not states.count:
         raise InputError("session", "the recording has no states")
     begin, end = 1e-9 * states.first_ns, 1e-9 * states.end_ns
@@ -65,7 +65,7 @@ def _check_time(states: States, at_s: float) -> None:
 
 
 def _pixels(text: str, smallest: int) -> tuple[int, int]:
-    """Width and height of --size; raises InputError."""
+    """Width and height of --size [pixels]. Raises InputError."""
     try:
         width, height = (int(part) for part in text.lower().split("x"))
     except ValueError:

@@ -51,7 +51,7 @@ def run(args: argparse.Namespace) -> int:
     if viewer == "auto":
         display = os.environ.get("DISPLAY") or os.environ.get("WAYLAND_DISPLAY")
         viewer = ("native" if display else "web") + (",workbench" if _has_page() else "")
-    # To be seen and not to be thrown out of sight: 2 cm/s in the 0.05 s of a poke.
+    # Visible, but not out of sight: 2 cm/s in the 0.05 s of a poke.
     force = f"{0.35 * scenario.setup.body.mass:.1g}"
     at = "com" if args.mesh else next(iter(scenario.setup.contacts), "com")
     client = as_typed("poke_client")
@@ -66,7 +66,7 @@ def run(args: argparse.Namespace) -> int:
 
 
 def _has_page() -> bool:
-    """Whether the page can be served; else why not is said."""
+    """Whether the page can be served; prints the reason if not."""
     from ..page.bundle import built_page
 
     try:

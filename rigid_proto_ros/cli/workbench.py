@@ -67,7 +67,7 @@ def run(args: argparse.Namespace) -> int:
 
 
 def _values(scene: str | None, mesh: str | None, has_script: bool) -> dict[str, Any] | None:
-    """The parameters that the page begins with; None for its own start."""
+    """The parameters with which the page starts; None for its default."""
     from ..page.file import values_of_mesh
     from ..scene.scene_file import is_mesh, scene_file, scene_values
 

@@ -1,2 +1,2 @@
 # SPDX-License-Identifier: MIT
-"""Mass properties from recorded motion, with what the motion can tell said before any number."""
+"""Mass properties from recorded motion, and which of them the motion determines, which is printed before any number."""

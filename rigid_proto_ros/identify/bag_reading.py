@@ -1,6 +1,6 @@
 # SPDX-License-Identifier: MIT
-"""Anybody's bags as measured flights, read by rosbags: which topics count, their messages as series, a wrench's as
-loads: commands that hold until the next one, or samples of what changed in between.
+"""Any bag as a measured flight, read with rosbags: topics are chosen, and their messages become series and loads. A
+wrench is a command that holds until the next one, or a sample of a load that changed in between.
 """
 
 from __future__ import annotations
@@ -26,18 +26,20 @@ KINDS = ("pose", "imu", "wrench")
 TRANSFORMS = ("geometry_msgs/msg/TransformStamped", "tf2_msgs/msg/TFMessage")
 
 WRENCH_TIMEOUT_NS = 1_500_000_000
-"""A wrench holds until the next message, and at most as long as the node's own default."""
+"""Longest time for which a wrench holds without a further message: the node's own default."""
 STEADY = 0.5
-"""Gaps between messages that differ from the usual one by less than this part of it are of one rate."""
+"""Gaps between messages belong to one rate if they differ from the usual gap by less than this fraction."""
 FEWEST_SAMPLED = 20
-"""Messages of a wrench that is called sampled."""
+"""Least number of messages of a sampled wrench."""
 LEAST_JUMP, MOST_CHANGES = 0.03, 16
-"""A sampled load's jump counts where it is more than this part of the largest force or torque, and so many do."""
+"""A jump of a sampled load counts above this fraction of the largest force or torque; and the largest number of such
+jumps.
+"""
 
 
 @dataclass(frozen=True)
 class Choice:
-    """What of a bag counts. topics: by option, as given, ``TOPIC`` or ``TOPIC@frame``."""
+    """The part of a bag that is used. topics: by option, as given, ``TOPIC`` or ``TOPIC@frame``."""
 
     topics: dict[str, str] = field(default_factory=dict)
     first_s: float = 0.0
@@ -47,9 +49,9 @@ class Choice:
 
 @dataclass(frozen=True)
 class _Topic:
-    """name and the frame that stands behind it, or empty; times_ns (n,) ascending, as the headers say; numbers (n, k):
-    position and attitude, rate and acceleration (NaN where an IMU doesn't measure them), or force and torque; parent
-    and child: frames of the first message.
+    """Messages of one topic. frame: the one given with the name, or empty. times_ns (n,): ascending, from the headers.
+    numbers (n, k): position and attitude, rate and acceleration (NaN if an IMU doesn't measure them), or force and
+    torque. parent, child: frames of the first message.
     """
 
     name: str
@@ -61,7 +63,7 @@ class _Topic:
 
 
 def bag_flight(path: Path, choice: Choice) -> ms.MeasuredFlight:
-    """What was measured in a bag; raises InputError naming the topic and what is wrong with it."""
+    """Read the measurements in a bag. Raises InputError, which names the topic and what is wrong with it."""
     chosen = _chosen_topics(path, choice)
     _check_clocks(chosen)
     begin = min(int(topic.times_ns[0]) for topic in chosen.values())
@@ -79,7 +81,7 @@ def bag_flight(path: Path, choice: Choice) -> ms.MeasuredFlight:
 
 
 def _chosen_topics(path: Path, choice: Choice) -> dict[str, _Topic]:
-    """By option."""
+    """Topics by option."""
     try:
         from rosbags.highlevel import AnyReader
         from rosbags.typesys import Stores, get_typestore
@@ -95,17 +97,17 @@ def _chosen_topics(path: Path, choice: Choice) -> dict[str, _Topic]:
                 message: Any = bag.deserialize(data, connection.msgtype)
                 parts = message.transforms if connection.msgtype == TRANSFORMS[1] else [message]
                 found[connection.topic] += [(logged_ns, part) for part in parts]
-        # Here, too, a type that the bag defines in its own way may lack what it is read for.
+        # Inside the try, since a type that the bag itself defines may lack a field that is read.
         return {kind: _topic(found[name], name, types[name], frame) for kind, (name, frame) in chosen.items()}
     except InputError:
         raise
-    except Exception as error:  # the library lets through whatever cut or damaged bytes lead to
+    except Exception as error:  # the library raises any exception for truncated or damaged files
         accepted = f"a bag that rosbags can read ({error}); ros2 bag reindex repairs a bag whose recorder was killed"
         raise InputError("session", str(path), accepted) from None
 
 
 def _chosen(types: dict[str, str], given: dict[str, str], path: str) -> dict[str, tuple[str, str]]:
-    """(topic, frame) by option: the given one, else the only one of its types."""
+    """Topic and frame by option: the topic given, or the only one of a suitable type."""
     found = {}
     for kind in KINDS:
         topics = sorted(topic for topic, its_type in types.items() if _READ.get(its_type, ("",))[0] == kind)
@@ -127,13 +129,15 @@ def _chosen(types: dict[str, str], given: dict[str, str], path: str) -> dict[str
 
 
 def _pair(one: Any, other: Any) -> tuple[float, ...]:
-    """Of two vectors, or of a position and an orientation xyzw."""
+    """Components of two vectors, or of a position and an orientation xyzw."""
     numbers = (one.x, one.y, one.z, other.x, other.y, other.z)
     return (*numbers, other.w) if hasattr(other, "w") else numbers
 
 
 def _imu(m: Any) -> tuple[float, ...]:
-    """A covariance that begins with -1 says that its quantity isn't measured (sensor_msgs/msg/Imu)."""
+    """Angular velocity and acceleration; NaN for one whose covariance begins with -1, which isn't measured
+    (sensor_msgs/msg/Imu).
+    """
     numbers = _pair(m.angular_velocity, m.linear_acceleration)
     has_rate, has_felt = m.angular_velocity_covariance[0] != -1.0, m.linear_acceleration_covariance[0] != -1.0
     none = (np.nan, np.nan, np.nan)
@@ -151,7 +155,7 @@ _READ: dict[str, tuple[str, Callable[[Any], tuple[float, ...]]]] = {
     "geometry_msgs/msg/WrenchStamped": ("wrench", lambda m: _pair(m.wrench.force, m.wrench.torque)),
     "sensor_msgs/msg/Imu": ("imu", _imu),
 }
-"""By the type of messages: the option that takes them, and the numbers of one."""
+"""By message type: the option that takes it, and the function that extracts its numbers."""
 
 
 def _topic(messages: list[tuple[int, Any]], name: str, message_type: str, frame: str) -> _Topic:
@@ -161,9 +165,9 @@ def _topic(messages: list[tuple[int, Any]], name: str, message_type: str, frame:
     elif frame and kind != "wrench":
         raise InputError(name, f"{name}@{frame}", f"{name} alone, since a {message_type} has no choice of frames")
     stamps = [m.header.stamp.sec * 1_000_000_000 + m.header.stamp.nanosec for _, m in messages]
-    if not any(stamps):  # nobody set them; one alone may be the begin of simulated time
+    if not any(stamps):  # stamps weren't set; a single zero may be the start of simulated time
         stamps = [logged for logged, _ in messages]
-    # Of messages with one stamp the first counts: a repeated one says nothing new.
+    # Of messages with equal stamps the first counts; the others are repetitions.
     times, first = np.unique(np.array(stamps, np.int64), return_index=True)
     numbers = np.array([numbers_of(message) for _, message in messages])[first]
     bad = np.flatnonzero(~np.isfinite(numbers).all(axis=1))
@@ -216,7 +220,7 @@ def _check_clocks(chosen: dict[str, _Topic]) -> None:
 
 
 def _wrench_frame(topic: _Topic, pose: _Topic) -> tuple[str, tuple[float, float, float] | None]:
-    """Axes of a wrench, and where it acts in the tracked frame, None for the centre of mass."""
+    """Axes of a wrench, and its point in the tracked frame; None for the centre of mass."""
     worlds, bodies = {"world", pose.parent} - {""}, {"body", pose.child} - {""}
     text = topic.frame or topic.parent
     axes, at, point = text.partition("@")
@@ -237,8 +241,8 @@ def _wrench_frame(topic: _Topic, pose: _Topic) -> tuple[str, tuple[float, float,
 def wrench_history(
     topic: str, times: IntArray, numbers: FloatArray, axes: str, where: tuple[float, float, float] | None
 ) -> ms.LoadHistory:
-    """Of messages at times (m,) [ns], ascending, with forces and torques (m, 6) along the axes of ``Load``, at a point
-    of the tracked frame or, for None, at the centre of mass.
+    """Loads of wrench messages. times (m,): ascending [ns]. numbers (m, 6): forces and torques. axes: as in ``Load``.
+    where: point in the tracked frame; None for the centre of mass.
     """
     acts: BoolArray = np.any(numbers != 0.0, axis=1)
     same = np.append(False, np.all(numbers[1:] == numbers[:-1], axis=1))
@@ -264,7 +268,7 @@ def wrench_history(
 
 
 def _sharpness(numbers: FloatArray) -> FloatArray:
-    """Which part of each change to the loads (m, 6) is a jump (m,): what changes steadily is known in between."""
+    """Fraction (m,) of each change of the loads (m, 6) that is a jump. A steady change is known between samples."""
     forces, torques = numbers[:, :3], numbers[:, 3:]
     parts = [part / max(float(np.linalg.norm(part, axis=1).max()), 1e-300) for part in (forces, torques)]
     steps = np.diff(np.hstack(parts), axis=0, prepend=np.hstack(parts)[:1])
@@ -274,10 +278,10 @@ def _sharpness(numbers: FloatArray) -> FloatArray:
 
 
 def _begins(times_ns: IntArray, acts: BoolArray) -> tuple[IntArray, FloatArray]:
-    """When the loads of messages at times_ns (m,) begin (m,), and how well that is known (m,) [s].
+    """Times (m,) [ns] at which the loads of messages at times_ns (m,) begin, and their standard deviations (m,) [s].
 
-    A command acts from its stamp on. A wrench at a steady rate that is also sent while nothing acts was sampled: it
-    changed at any time since the message before, on average in the middle.
+    A command acts from its stamp on. A wrench that is sent at a steady rate, even while it is zero, is a sampled load:
+    it changed at some time since the previous message, on average midway.
     """
     gaps = np.diff(times_ns)
     if len(times_ns) < FEWEST_SAMPLED or not np.any(~acts[:-1] & acts[1:]):

@@ -1,11 +1,11 @@
 # SPDX-License-Identifier: MIT
-"""The fit: the initial estimate is improved on short segments, which converge from far, then on ever longer ones, until
-each flight is one segment.
+"""The fit. It improves the initial estimate on short segments, which converge from far away, then on ever longer ones,
+until each flight is one segment.
 
-With [J_start J r] = Q R the start of a segment takes what it can of the residuals, and the rows of R below its own are
-what is left: so every segment finds its own start while the steps are of the few numbers that all share (variable
-projection: Golub and Pereyra, SIAM J. Numer. Anal. 10, 1973, with Kaufman's derivative). The steps are Levenberg's and
-Marquardt's, among the bodies that can exist.
+With [J_start J r] = Q R, the start of a segment fits what it can of the residuals, and the rows of R below its own hold
+the rest. Every segment thus has its optimal start while steps are made only in the few unknowns that all segments share
+(variable projection: Golub and Pereyra, SIAM J. Numer. Anal. 10, 1973, with Kaufman's derivative). The steps are
+Levenberg-Marquardt steps, restricted to bodies that can exist.
 """
 
 from __future__ import annotations
@@ -25,30 +25,36 @@ from .trajectories import STATE
 from .unknowns import Unknowns, Values, is_possible, possible_step, possible_tensor
 
 START_WIDTHS = np.repeat([1e3, 0.1, 1e3, 1e3], 3)
-"""Standard deviations of what is assumed of a start beforehand, little: what too few samples leave open stays where it
-is, and takes nothing of the residuals.
+"""Standard deviations of a weak prior of a start: what too few samples leave undetermined stays where it is and doesn't
+affect the residuals.
 """
 SETTLING = 6
-"""Most steps of the starts alone before the first step of the unknowns."""
+"""Largest number of steps of the starts alone before the first step of the unknowns."""
 CONVERGED = 0.1
-"""Part of the squares that starts could still take away, by a step that is then the last one."""
+"""A step of the starts is the last one if they could reduce the squares by less than this fraction."""
 SMALL_STEP = 0.03
-"""Of all residuals together, in standard deviations: such a step is the last one."""
+"""Norm of a step's change of all residuals [standard deviations]; a smaller step is the last one."""
 POOR, GOOD = 0.25, 0.75
-"""Parts of what a step promised that it kept: below the first the damping grows, above the second it shrinks."""
+"""Ratio of a step's actual to its promised reduction: below the first the damping grows, above the second it
+shrinks.
+"""
 SLICE = 128
-"""Rows of a QR decomposition at once."""
+"""Number of rows in one QR decomposition."""
 FIRST_DAMPING, MOST_DAMPING = 1.0, 1e12
 LONGEST_STEP = 1.0
-"""In what counts as a large change of each unknown: farther away the body may spin so fast that no flight ends."""
+"""Largest step, in units in which 1 is a large change of each unknown. Farther away the body may spin so fast that no
+flight ends.
+"""
 FIRST_ANGLE = 3.0
-"""Turn of the first segments [rad], of which the initial estimate's errors of some hundredths aren't much."""
+"""Rotation in a segment of the first stage [rad]; the initial estimate's errors of some hundredths are small in
+comparison.
+"""
 MOST_SEGMENTS = 40
-"""Of all flights together in the first stage."""
+"""Largest number of segments of all flights in the first stage."""
 FEWEST_SAMPLES = 6
-"""Of a segment in the first stage: a start has 12 numbers."""
+"""Least number of samples of a segment in the first stage: a start has 12 numbers."""
 OFFSET_MARGIN_S = 0.05
-"""The largest difference of two clocks that is looked for."""
+"""Largest difference of two clocks that is considered [s]."""
 
 
 USUAL = (
@@ -58,7 +64,7 @@ USUAL = (
 
 
 class CannotFlyError(InputError):
-    """An estimate with which a flight can't be simulated."""
+    """A flight can't be simulated with an estimate."""
 
     def __init__(self) -> None:
         super().__init__("identify", f"the estimate can't be simulated; {USUAL}")
@@ -66,9 +72,9 @@ class CannotFlyError(InputError):
 
 @dataclass(frozen=True)
 class Linear:
-    """numbers (n,): the unknowns. starts: where the segments were flown from. triangles: R of each segment.
+    """The problem linearized. numbers (n,): the unknowns. starts: of the segments. triangles: R of each segment.
 
-    residuals (k,) and their jacobian (k, n): of all segments together, the starts eliminated.
+    residuals (k,) and their jacobian (k, n): of all segments together, with the starts eliminated.
     """
 
     numbers: FloatArray
@@ -84,12 +90,12 @@ class Linear:
 
     @property
     def could_take(self) -> float:
-        """Sum of the squares that the starts could still take away."""
+        """Sum of the squares that a change of the starts could still remove."""
         own = [triangle[: len(start) - 1, -1] for triangle, start in zip(self.triangles, self.starts, strict=True)]
         return sum(float(part @ part) for part in own)
 
     def starts_for(self, numbers: FloatArray) -> list[FloatArray]:
-        """The best starts for other unknowns, as far as the derivatives say."""
+        """The best starts for other unknowns, to first order."""
         change = np.append(numbers - self.numbers, 1.0)
         found = []
         for start, triangle in zip(self.starts, self.triangles, strict=True):
@@ -101,9 +107,9 @@ class Linear:
 
 @dataclass(frozen=True)
 class Problem:
-    """Segments flown with ``unknowns`` about the values ``given``, in numbers (n,) of which 1 is a large change.
-    sigmas: standard deviation of the noise by name of the series. prior: 1 for a wide one about what was given, which
-    holds what the motion can't tell and hardly moves the rest; 0 for none.
+    """Segments and the unknowns to fit, as numbers (n,) relative to ``given``, in which 1 is a large change. sigmas:
+    standard deviation of the noise by name of the series. prior: 1 for a wide one around ``given``, which fixes what
+    the motion doesn't determine and hardly affects the rest; 0 for none.
     """
 
     segments: Sequence[sh.Segment]
@@ -113,11 +119,11 @@ class Problem:
     prior: float = 1.0
 
     def values(self, numbers: FloatArray) -> Values:
-        """With these numbers."""
+        """The values for these numbers."""
         return self.unknowns.moved(self.given, self.unknowns.scales(self.given) * numbers)
 
     def linear(self, numbers: FloatArray, starts: Sequence[FloatArray]) -> Linear | None:
-        """The residuals and their derivatives about these numbers and starts; None where a flight failed."""
+        """The residuals and their derivatives at these numbers and starts; None if a flight failed."""
         turn = max(segment.flight.high_rate * segment.duration_s for segment in self.segments)
         variations = sh.Variations(self.unknowns, self.given, numbers, turn)
         triangles, rows = [], [self.prior * np.column_stack([np.eye(len(numbers)), numbers])]
@@ -135,7 +141,7 @@ class Problem:
         return Linear(numbers, list(starts), triangles, left[:, -1], left[:, :-1])
 
     def settled(self, numbers: FloatArray, starts: Sequence[FloatArray]) -> list[FloatArray]:
-        """Starts improved by steps of their own; raises CannotFlyError."""
+        """Improve the starts with the unknowns fixed. Raises CannotFlyError."""
         alone = replace(self, given=self.values(numbers), unknowns=Unknowns(()))
         for _ in range(SETTLING):
             linear = alone.linear(np.zeros(0), starts)
@@ -147,7 +153,7 @@ class Problem:
         return list(starts)
 
     def step(self, here: Linear, damping: float) -> FloatArray:
-        """The best step (n,) with at least this damping, not too long and to a body that can exist."""
+        """The best step (n,) with at least this damping, limited in length and to bodies that can exist."""
         width = len(here.numbers)
         residuals = np.concatenate([here.residuals, np.zeros(width)])
         while True:
@@ -165,12 +171,12 @@ class Problem:
     def solved(
         self, starts: Sequence[FloatArray], most: int = 12, tolerance: float = 1e-2
     ) -> tuple[Values, list[FloatArray]]:
-        """The best values and starts, until a step promises less than this part of the squares: it is taken unseen.
-        Raises CannotFlyError.
+        """Iterate to the best values and starts, until a step promises to reduce the squares by less than this
+        fraction; that step is taken unchecked. Raises CannotFlyError.
         """
         zero, damping = np.zeros(len(self.unknowns)), FIRST_DAMPING
-        # What a start could still take counts as taken already: so it has to be near before steps are measured by what
-        # is left.
+        # The residuals leave out what the starts could still fit, so the starts must be close to their optimum before a
+        # step is judged by the residuals.
         here = self.linear(zero, self.settled(zero, starts))
         if here is None:
             raise CannotFlyError
@@ -193,11 +199,11 @@ class Problem:
             if damping > MOST_DAMPING:
                 break
         values = self.values(numbers)
-        # Rounding may have left it a little outside.
+        # Rounding may have left it slightly outside.
         return replace(values, inertia=possible_tensor(values.inertia)), here.starts_for(numbers)
 
     def noise_left(self, values: Values, starts: Sequence[FloatArray]) -> dict[str, float]:
-        """Standard deviation of each series from its residuals; those of one topic and quantity share it over all
+        """Standard deviation of each series from its residuals. Series of the same topic and quantity share it over all
         flights.
         """
         found: dict[str, list[FloatArray]] = {name: [] for name in self.sigmas}
@@ -214,8 +220,8 @@ class Problem:
 def upper_triangle(rows: FloatArray) -> FloatArray:
     """R of a QR decomposition of rows (n, k).
 
-    In slices, as LAPACK would share more rows out among threads that wait for one another: eight times as much
-    processor time was seen.
+    Computed in slices: LAPACK would distribute more rows to threads that wait for one another, which took eight times
+    as much processor time.
     """
     triangle = np.zeros((0, rows.shape[1]))
     for first in range(0, len(rows), SLICE):
@@ -224,7 +230,7 @@ def upper_triangle(rows: FloatArray) -> FloatArray:
 
 
 def residuals_of(segment: sh.Segment, start: FloatArray, values: Values) -> list[Points]:
-    """Measured minus shown of each series (m, 3), in its own unit; raises CannotFlyError."""
+    """Measured minus predicted values of each series (m, 3), in its own unit. Raises CannotFlyError."""
     found = sh.segment_residuals(segment, start, values)
     if found is None:
         raise CannotFlyError
@@ -232,9 +238,10 @@ def residuals_of(segment: sh.Segment, start: FloatArray, values: Values) -> list
 
 
 class Estimate:
-    """values: what came out of a problem whose segments are whole flights, with their starts.
+    """The solution of a problem whose segments are whole flights. values: the estimate. starts: of the segments.
 
-    root (k, n): rootᵀ root is the Fisher information of the unknowns, the starts eliminated. Raises CannotFlyError.
+    root (k, n): rootᵀ root is the Fisher information of the unknowns, with the starts eliminated. Raises
+    CannotFlyError.
     """
 
     def __init__(self, problem: Problem, values: Values, starts: list[FloatArray]) -> None:
@@ -248,8 +255,8 @@ class Estimate:
         self._cost = linear.cost
 
     def rise(self, change: FloatArray) -> float:
-        """By how much the squares rise with the unknowns changed (n,), whatever the starts are then; without end for a
-        body that can't exist.
+        """Increase of the squares if the unknowns change by (n,) and the starts are fitted again; infinite for a body
+        that can't exist.
         """
         problem = replace(self.problem, given=self.unknowns.moved(self.values, change))
         if not is_possible(problem.given.inertia):
@@ -262,7 +269,7 @@ class Estimate:
 
 
 def fit_flights(flights: Sequence[MeasuredFlight], unknowns: Unknowns, values: Values) -> Estimate:
-    """The most likely values, from these on; raises CannotFlyError."""
+    """The most likely values, starting from ``values``. Raises CannotFlyError."""
     total = sum(flight.duration_s for flight in flights)
     samples = sum(len(flight.pose[0].times_ns) for flight in flights)
     rate = max(flight.high_rate for flight in flights)
@@ -281,7 +288,7 @@ def fit_flights(flights: Sequence[MeasuredFlight], unknowns: Unknowns, values: V
             break
         values, starts = problem.solved(starts)
         sigmas = problem.noise_left(values, starts)
-        # Segments twice as long begin where every second of these does.
+        # Segments of twice the length begin where every second one of these does.
         known = {(id(one.flight), one.begin_ns): start for one, start in zip(problem.segments, starts, strict=True)}
         length *= 2.0
     for _ in range(5):

@@ -1,6 +1,6 @@
 # SPDX-License-Identifier: MIT
-"""From measured flights to the body's mass properties, and what ``rigid_proto identify`` prints of them: the verdict,
-then the identified numbers with their standard deviations.
+"""From measured flights to mass properties, and the output of ``rigid_proto identify``: the verdict, then the
+identified numbers with their standard deviations.
 """
 
 from __future__ import annotations
@@ -23,9 +23,9 @@ from .unknowns import DEFAULT_FIT, Values, make_unknowns, possible_tensor
 from .verdict import Identifiability, Quantity, ResidualCheck, Unidentified, check_residuals
 
 GUESSED_RADIUS = 0.1
-"""Of the ball that stands for a body of which nothing is known [m]."""
+"""Radius of the ball that stands for an unknown body [m]."""
 FEWEST = 8
-"""Poses of a flight."""
+"""Least number of poses of a flight."""
 MISFIT = "the residuals are larger than the noise, so the errors may be larger than the standard deviations"
 OTHER_UNITS = {"gravity": "m/s²", "offset": "s", "gyro_bias": "rad/s", "accel_bias": "m/s²", "imu_place": "m"}
 DAMPING_UNITS = ("N s/m", "N m s")
@@ -33,8 +33,8 @@ DAMPING_UNITS = ("N s/m", "N m s")
 
 @dataclass(frozen=True)
 class Identification:
-    """The estimate, what of it is identified, and the checks of its residuals. guessed: of ``mass``, ``com`` and
-    ``inertia`` what was neither asked for nor given, which has no number.
+    """The estimate, what of it is identified, and the checks of its residuals. guessed: which of ``mass``, ``com`` and
+    ``inertia`` were neither requested nor given, and therefore have no number.
     """
 
     flights: Sequence[MeasuredFlight]
@@ -51,7 +51,7 @@ class Identification:
 
     @property
     def verdict(self) -> str:
-        """What is identified, in a sentence, after the warning that the model doesn't fit, if it doesn't."""
+        """One sentence on what is identified, after a warning if the model doesn't fit."""
         text = "all requested quantities are identified from this motion"
         if self.unidentified:
             words = {"mass": [self.mass], "centre of mass": self.center_of_mass, "tensor": self.inertia}
@@ -65,17 +65,17 @@ class Identification:
 
     @property
     def fits(self) -> bool:
-        """Whether the residuals are noise: else the numbers may be far off, whatever their standard deviations."""
+        """Whether the residuals are noise. If not, the numbers may be far off, whatever their standard deviations."""
         return all(check.is_noise for check in self.checks)
 
     @property
     def mass(self) -> Quantity:
-        """[kg]."""
+        """The mass [kg]."""
         return self._each(lambda values: [values.mass], "mass")[0]
 
     @property
     def center_of_mass(self) -> list[Quantity]:
-        """[m, tracked frame]."""
+        """Components of the centre of mass [m, tracked frame]."""
         return self._each(lambda values: values.center_of_mass, "com")
 
     @property
@@ -85,7 +85,7 @@ class Identification:
 
     @property
     def shape(self) -> list[Quantity]:
-        """The same divided by the tensor's trace."""
+        """The entries of the tensor divided by its trace."""
         return self._whole(lambda values: six_from_tensor(values.inertia / np.trace(values.inertia)))
 
     @property
@@ -95,14 +95,14 @@ class Identification:
 
     @property
     def others(self) -> dict[str, Quantity]:
-        """Whatever else was asked for, by name."""
+        """Other requested quantities by name."""
         unknowns, slots = self.estimate.unknowns, self._other_slots
         found = self.identifiability.quantities(lambda values: [unknowns.read(values, slot) for slot in slots])
         return dict(zip(map(unknowns.name, slots), found, strict=True))
 
     @property
     def units(self) -> dict[str, str]:
-        """Of the others, by name."""
+        """Units of the others by name."""
         unknowns, found = self.estimate.unknowns, {}
         for slot in self._other_slots:
             group, index = unknowns.slots[slot]
@@ -111,7 +111,7 @@ class Identification:
 
     @property
     def remarks(self) -> list[str]:
-        """On the residuals, what usually is the cause first, where they are no noise."""
+        """Remarks on residuals that aren't noise, the most usual cause first."""
         return [*([] if self.fits else [USUAL]), *(remark for check in self.checks for remark in check.remarks)]
 
     @property
@@ -123,15 +123,17 @@ class Identification:
         return [Quantity(None, None)] * len(found) if group in self.guessed else found
 
     def _whole(self, read: Callable[[Values], Numbers]) -> list[Quantity]:
-        """All of them or none: an entry that happens to be 0 has the size of the others."""
+        """All quantities, or none if one isn't identified: an entry that happens to be 0 has the scale of the
+        others.
+        """
         found = self._each(read, "inertia")
         return found if all(one.value is not None for one in found) else [Quantity(None, None)] * len(found)
 
 
 @dataclass(frozen=True)
 class Known:
-    """mass [kg] when it is known. body: what stands for whatever isn't estimated, or None. length: of the body, by
-    which an error of its COM is large [m].
+    """What is known beforehand. mass: [kg], or None. body: values for whatever isn't estimated, or None. length: of the
+    body; an error of the COM by this length is large [m].
     """
 
     mass: float | None = None
@@ -139,13 +141,13 @@ class Known:
     length: float = GUESSED_RADIUS
 
 
-@np.errstate(all="ignore")  # of numbers that no flight has, which are refused
+@np.errstate(all="ignore")  # for numbers that no flight has, which are refused
 def identify(
     flights: Sequence[MeasuredFlight],
     fit: Sequence[str] = DEFAULT_FIT,
     known: Known | None = None,
 ) -> Identification:
-    """Mass properties of the body that flew in all of these flights; raises InputError."""
+    """Identify the mass properties of the body of these flights. Raises InputError."""
     known = known or Known()
     for flight in flights:
         count = len(flight.pose[0].times_ns)
@@ -161,7 +163,7 @@ def identify(
     by_flight = frozenset({"gravity", "damping"} - set(fit))
     try:
         estimate = fit_flights(flights, unknowns, replace(_first_values(flights[0], known), by_flight=by_flight))
-    except np.linalg.LinAlgError:  # of numbers that overflow
+    except np.linalg.LinAlgError:  # for numbers that overflow
         raise CannotFlyError from None
     given = {"mass": known.mass is not None or known.body is not None}
     guessed = frozenset(name for name in DEFAULT_FIT if name not in fit and not given.get(name, known.body is not None))
@@ -171,7 +173,7 @@ def identify(
 
 
 def _first_values(first: MeasuredFlight, known: Known) -> Values:
-    """What holds where nothing is estimated."""
+    """Values of whatever isn't estimated."""
     mass, zero = known.mass or (known.body.mass if known.body is not None else 1.0), np.zeros(3)
     inertia = 0.4 * mass * GUESSED_RADIUS**2 * np.eye(3)
     if known.body is not None:
@@ -201,7 +203,7 @@ def _assumed(flights: Sequence[MeasuredFlight], known: Known, fit: Sequence[str]
 
 
 def as_json(found: Identification) -> dict[str, Any]:
-    """The command's JSON object; what isn't identified is null."""
+    """The command's JSON object; values that aren't identified are null."""
 
     def pair(quantity: Quantity) -> dict[str, float | None] | None:
         return None if quantity.value is None else asdict(quantity)
@@ -243,7 +245,7 @@ def as_text(found: Identification) -> list[str]:
 
 
 def number(quantity: Quantity) -> str:
-    """Value ± standard deviation, with two digits of the latter."""
+    """Value ± standard deviation, the latter with two digits."""
     value, sd = quantity.value, quantity.sd
     if value is None or sd is None or not 0.0 < sd < math.inf:
         return f"{value:.9g}"
@@ -252,7 +254,7 @@ def number(quantity: Quantity) -> str:
 
 
 def as_urdf(found: Identification) -> str:
-    """A URDF <inertial>; raises InputError where not all of it is identified."""
+    """A URDF <inertial>. Raises InputError if part of it isn't identified."""
     parts = [found.mass, *found.center_of_mass, *found.inertia]
     if any(part.value is None for part in parts):
         raise InputError("--urdf", f"{found.verdict}; a URDF needs mass, centre of mass and tensor")

@@ -1,14 +1,14 @@
 # SPDX-License-Identifier: MIT
-"""What measured poses say by themselves: how noisy they are, where a segment starts, and a first body by linear least
-squares. No guess of the body is needed, and nothing is integrated.
+"""Estimates from measured poses alone: their noise, the start of a segment, and a first body by linear least squares.
+This needs no guess of the body and no integration.
 
-With R the attitude, c the centre of mass and S the tensor divided by its trace, all measured samples obey
+With the attitude R, the centre of mass c and the tensor divided by its trace S, all measured samples obey
 
     p + R c = x0 + v0 t + ½ g t² + (1/m) ∬ F dt² - (d/m) ∫ p dt,      R S ω = L0 + κ ∫ τ dt - κ a ∫ ω dt,  κ = 1 / tr I,
 
-which are linear in c, 1/m and d/m, then in S, κ and κ a, d and a being damping; x0, v0 and L0 are projected out. The
-trace of S is 1, so that rates that are noise don't make the body small. As the loads' integrals are known, one poke in
-a long fall tells the mass as well as in a short one.
+which are linear in c, 1/m and d/m, then in S, κ and κ a; d and a are the dampings. x0, v0 and L0 are projected out. The
+trace of S is fixed at 1, so that rates that are only noise don't make the body small. Since the integrals of the loads
+are known, one poke determines the mass in a long fall as well as in a short one.
 """
 
 from __future__ import annotations
@@ -26,27 +26,33 @@ from . import rotations as rot
 from .unknowns import Unknowns, Values, possible_tensor
 
 NEIGHBOURS = 9
-"""Samples for a local parabola: at 100 Hz and .2 degrees of noise its slope errs by some hundredths rad/s."""
+"""Number of samples for a local parabola: at 100 Hz and .2 degrees of noise, its slope errs by some hundredths
+rad/s.
+"""
 NEAR_TURN = 1.5
-"""Over which rotation vectors change nearly as the angular velocity does [rad]."""
+"""Rotation over which rotation vectors change nearly at the angular velocity [rad]."""
 MOST_DIFFERENCES = 7
-"""Of noise all orders from the third on have the same spread, but for their factor; of a motion the higher ones leave
-less.
+"""Highest order of differences. For noise all orders from the third on give the same spread, apart from their factor;
+the higher ones contain less of the motion.
 """
 MEDIAN = 0.6745
-"""Of the size of a normal number, in standard deviations."""
+"""Median of the absolute value of a standard normal number."""
 LEAST_NOISE = 1e-6
-"""Of the largest value of a series: difference quotients of flights don't tell less from rounding."""
+"""Least noise, relative to the largest value of a series: difference quotients of flights can't resolve less than that
+from rounding.
+"""
 TURN = 0.5
-"""Between the two attitudes that give an angular velocity [rad]: farther apart the mean isn't the middle's."""
+"""Rotation between the two attitudes that give an angular velocity [rad]; over larger ones the mean isn't the value
+midway.
+"""
 TOLD = 4.0
-"""Standard deviations that 1/m and 1/tr I have to be above 0, to say the mass and the size of the tensor."""
+"""1/m and 1/tr I must be above 0 by this many standard deviations to determine the mass and the size of the tensor."""
 THIN = 1e-2
-"""Least second moment of the first body, of the largest."""
+"""Least second moment of the first body, relative to the largest."""
 LOOSE = 3.0
-"""Standard deviation of what is assumed of shape and, in sizes of the body, of the centre of mass."""
+"""Standard deviation of the prior of the shape and, in sizes of the body, of the centre of mass."""
 POINTS = 8
-"""Impulses that stand for a load between two samples, and at least for each load."""
+"""Number of impulses that replace a load between two samples, and least number for each load."""
 MOST_POINTS = 200
 _SHAPES = [
     np.array(rows, float)
@@ -58,12 +64,12 @@ _SHAPES = [
         ((0, 0, 0), (0, 0, 1), (0, 1, 0)),
     )
 ]
-"""What the shape may have beside a third of the unit tensor: symmetric, of trace 0."""
+"""Basis of the shape's difference from a third of the unit tensor: symmetric, trace 0."""
 
 
 def noise_by_differences(series: ms.Series) -> float:
-    """Standard deviation of one component of the noise, from third and higher differences, in which a smooth motion
-    hardly shows; rough where the samples aren't evenly spaced.
+    """Standard deviation of one component of the noise, from third and higher differences, which hardly contain a
+    smooth motion. Rough if the samples aren't evenly spaced.
     """
     if len(series.values) < 5:
         return 1.0
@@ -78,7 +84,7 @@ def noise_by_differences(series: ms.Series) -> float:
 
 
 def least_noise(series: ms.Series) -> float:
-    """What is taken for noise where there is less."""
+    """Lower bound of a series' noise."""
     return LEAST_NOISE * max(1.0, float(np.max(np.abs(series.values))))
 
 
@@ -88,22 +94,22 @@ def local_start(flight: ms.MeasuredFlight, time_ns: int) -> StateRow:
     start = np.zeros(13)
     start[:3], start[7:10] = _parabola(position.times_ns, position.values, time_ns, NEIGHBOURS)
     turn = float(np.median(np.linalg.norm(rot.turns(attitude.values), axis=1)))
-    # Farther away the body has turned so much that a parabola doesn't follow.
+    # Over a larger rotation a parabola doesn't fit.
     count = min(NEIGHBOURS, max(3, int(NEAR_TURN / max(turn, 1e-9)) + 1))
     near = int(np.clip(np.searchsorted(attitude.times_ns, time_ns), 0, len(attitude.values) - 1))
     middle = attitude.values[near]
     around = slice(max(near - count, 0), near + count + 1)
     turns = rot.logarithm(rot.product(rot.inverse(middle), attitude.values[around]))
     turn_now, slope = _parabola(attitude.times_ns[around], turns, time_ns, count)
-    # A vector's rate is the angular velocity but for half its product with it, and so on; of a small turn nothing is
-    # left of that.
+    # The angular velocity is a rotation vector's rate minus half its cross product with the rate, plus higher terms,
+    # which vanish for a small rotation.
     start[3:7] = rot.product(middle, rot.exponential(turn_now))
     start[10:13] = slope - 0.5 * rot.cross(turn_now, slope)
     return start
 
 
 def _parabola(times_ns: IntArray, values: Points, time_ns: int, count: int) -> tuple[Vector3, Vector3]:
-    """Value (3,) and slope (3,) [1/s] at a time, of the ``count`` samples (n, 3) nearest to it."""
+    """Value (3,) and slope (3,) [1/s] at a time, from the ``count`` samples (n, 3) nearest to it."""
     count = min(count, len(times_ns))
     first = int(np.clip(np.searchsorted(times_ns, time_ns) - count // 2, 0, len(times_ns) - count))
     seconds = 1e-9 * (times_ns[first : first + count] - time_ns)
@@ -114,10 +120,10 @@ def _parabola(times_ns: IntArray, values: Points, time_ns: int, count: int) -> t
 
 @dataclass(frozen=True)
 class Impulses:
-    """A flight's loads as small impulses, whose sums are the integrals that the balance of momentum needs.
+    """A flight's loads as small impulses, whose sums are the integrals in the balance of momentum.
 
-    seconds (k,) ascending, impulses (k, 3) [N s, world], and angular ones about the tracked frame's origin (k, 3)
-    [N m s, world], or about the centre of mass where ``at_com`` (k,); attitudes (k, 4): of the body then.
+    seconds (k,): ascending. impulses (k, 3): [N s, world]. angular (k, 3): about the tracked frame's origin [N m s,
+    world], or about the centre of mass where ``at_com`` (k,). attitudes (k, 4): of the body at these times.
     """
 
     seconds: FloatArray
@@ -144,7 +150,7 @@ class Impulses:
 
 @dataclass(frozen=True)
 class _Poses:
-    """Of a flight, seconds (n,) from its begin, positions (n, 3) [m], attitudes (n, 4) xyzw, and its loads."""
+    """A flight's seconds (n,) from its begin, positions (n, 3) [m], attitudes (n, 4) xyzw, and loads."""
 
     flight: ms.MeasuredFlight
     seconds: FloatArray
@@ -154,8 +160,8 @@ class _Poses:
 
 
 def initial_values(flights: Sequence[ms.MeasuredFlight], unknowns: Unknowns, values: Values) -> Values:
-    """``values`` with the free ones of mass, centre of mass, tensor and damping as the balance of momentum says, where
-    it does.
+    """``values`` with mass, centre of mass, tensor and damping from the balance of momentum, as far as they are
+    unknowns and it determines them.
     """
     poses = []
     for flight in flights:
@@ -165,19 +171,19 @@ def initial_values(flights: Sequence[ms.MeasuredFlight], unknowns: Unknowns, val
         poses.append(_Poses(flight, seconds, position.values, attitude.values, impulses))
     is_slowed = any(flight.own(values).damping[0] > 0.0 for flight in flights)
     for _ in range(2 if is_slowed or "damping" in unknowns else 1):
-        # Drag is that of the centre of mass, whose path has to be known for it.
+        # Drag acts at the centre of mass, so its path is needed, and found in a second pass.
         values = _from_path(poses, unknowns, values)
     return _from_turns(poses, unknowns, values)
 
 
 def _integral(seconds: FloatArray, vectors: Points) -> Points:
-    """∫ (n, 3) of vectors (n, 3) from the first time on, by trapezoids."""
+    """∫ (n, 3) of vectors (n, 3) from the first time on, by the trapezoidal rule."""
     steps = 0.5 * np.diff(seconds)[:, None] * (vectors[1:] + vectors[:-1])
     return np.vstack([np.zeros(3), np.cumsum(steps, axis=0)])
 
 
 def _impulses_of(history: ms.LoadHistory, begin_ns: int, seconds: FloatArray, attitudes: FloatArray) -> Impulses:
-    """Of a flight's loads, turned by its attitudes (n, 4) at seconds (n,) since ``begin_ns``."""
+    """Impulses of a flight's loads, turned by its attitudes (n, 4) at seconds (n,) since ``begin_ns``."""
     begin, end = (1e-9 * (edge - begin_ns) for edge in (history.begin_ns, history.end_ns))
     apart = float(np.median(np.diff(seconds)))
     counts = np.clip(np.ceil(POINTS * (end - begin) / apart), POINTS, MOST_POINTS).astype(int)
@@ -204,11 +210,11 @@ def _impulses_of(history: ms.LoadHistory, begin_ns: int, seconds: FloatArray, at
 
 
 def _from_path(poses: Sequence[_Poses], unknowns: Unknowns, values: Values) -> Values:
-    """With centre of mass, mass and linear damping from how the centre of mass moves."""
+    """``values`` with centre of mass, mass and linear damping from the path of the centre of mass."""
     is_damped, drags, rows = "damping" in unknowns, [one.flight.own(values).damping[0] for one in poses], []
     for one, drag in zip(poses, drags, strict=True):
         t = one.seconds[:, None]
-        # Columns of the attitude's matrix are its turned axes.
+        # The columns of the rotation matrix are the body's axes in the world.
         turns = rot.turned(one.attitudes[:, None], np.eye(3)[None]).transpose(0, 2, 1)
         right = 0.5 * t * t * one.flight.own(values).gravity - one.positions
         moved = -_integral(one.seconds, one.positions + turns @ values.center_of_mass - one.positions[0])
@@ -226,7 +232,7 @@ def _from_path(poses: Sequence[_Poses], unknowns: Unknowns, values: Values) -> V
 
 
 def _from_turns(poses: Sequence[_Poses], unknowns: Unknowns, values: Values) -> Values:
-    """With tensor and angular damping from how the body turns."""
+    """``values`` with tensor and angular damping from the rotation."""
     if "inertia" not in unknowns:
         return values
     is_damped, drags, rows = "damping" in unknowns, [one.flight.own(values).damping[1] for one in poses], []
@@ -235,7 +241,8 @@ def _from_turns(poses: Sequence[_Poses], unknowns: Unknowns, values: Values) -> 
         seconds = 0.5 * (begin + end)
         shape = np.stack([rot.turned(attitudes, rates @ basis) for basis in _SHAPES], axis=2)
         angular = replace(one.impulses, impulses=one.impulses.about(values.center_of_mass))
-        # A rate is the mean over its time, so the momentum is too: a load may begin, end or act at once within it.
+        # A rate is a mean over its interval, so the momentum is averaged, too: a load may begin, end or act as an
+        # impulse within it.
         pushed = (angular.path(end) - angular.path(begin)) / (end - begin)[:, None]
         turned = rot.turned(attitudes, rates)
         slowed = -_integral(seconds, turned)
@@ -255,38 +262,38 @@ def _from_turns(poses: Sequence[_Poses], unknowns: Unknowns, values: Values) -> 
 
 
 def _inverse(found: float, sd: float, guess: float) -> float:
-    """1/guess, or what was found for it where that is told; where it isn't, no more than is possible: the loads would
-    throw a body that is far too light about.
+    """The value found for 1/guess if it is determined, otherwise 1/guess, limited to the largest likely value: the
+    loads would throw a body that is far too light about.
     """
     most = found + TOLD * sd
     return float(found) if found > TOLD * sd else min(1.0 / guess, most) if most > 0.0 else 1.0 / guess
 
 
 def _rates(poses: _Poses) -> tuple[FloatArray, FloatArray, FloatArray, Points]:
-    """Between two attitudes each: begin and end (m,) [s], attitudes midway (m, 4), and mean angular velocities (m, 3)
-    [rad/s, body axes].
+    """Begin and end (m,) [s] of intervals between two attitudes, attitudes midway (m, 4), and mean angular velocities
+    (m, 3) [rad/s, body axes].
     """
     step = float(np.median(np.linalg.norm(rot.turns(poses.attitudes), axis=1)))
     apart = int(np.clip(TURN / max(step, 1e-9), 1, max(len(poses.seconds) // 8, 1)))
     begin, end = poses.seconds[:-apart], poses.seconds[apart:]
     turn = rot.logarithm(rot.product(rot.inverse(poses.attitudes[:-apart]), poses.attitudes[apart:]))
     middle = rot.product(poses.attitudes[:-apart], rot.exponential(0.5 * turn))
-    # Over a gap the body may have turned by any number of times.
+    # Within a gap the body may have made any number of turns.
     kept = end - begin < 3.0 * float(np.median(end - begin))
     return begin[kept], end[kept], middle[kept], (turn / (end - begin)[:, None])[kept]
 
 
 def _without(basis: FloatArray, columns: FloatArray) -> FloatArray:
-    """Rows (3 n, k) of columns (n, 3, k) less the part of each that ``basis`` (n, b) can make, axis by axis."""
+    """Rows (3 n, k) of columns (n, 3, k) minus their projection onto ``basis`` (n, b), for each axis."""
     Q, _ = np.linalg.qr(basis)
     rest = columns - np.tensordot(Q, np.tensordot(Q.T, columns, 1), 1)
     return rest.reshape(-1, columns.shape[2])
 
 
 def _solved(rows: FloatArray, free: BoolArray, known: FloatArray, widths: FloatArray) -> tuple[FloatArray, FloatArray]:
-    """Numbers (k,) with the least squares of rows (n, k + 1), whose last column is the right side, and standard
-    deviations (k,) of those that are ``free``; the others stay as ``known``. widths: standard deviations of what is
-    known of the free ones, which counts as much as one sample.
+    """Least-squares solution (k,) of rows (n, k + 1), whose last column is the right side, and standard deviations
+    (k,). Only numbers that are ``free`` change from ``known``. widths: standard deviations of the prior of the free
+    ones, which has the weight of one sample.
     """
     matrix, right = rows[:, :-1][:, free], rows[:, -1] - rows[:, :-1][:, ~free] @ known[~free]
     found, sds, noise = np.array(known), np.zeros(len(known)), 0.0

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""What was measured of flights: series of samples, the loads that acted, and what is known beforehand."""
+"""Measurements of flights: series of samples, the loads that acted, and what is known beforehand."""
 
 from __future__ import annotations
 
@@ -23,11 +23,11 @@ UNITS = {POSITION: "m", ATTITUDE: "rad", RATE: "rad/s", ACCELERATION: "m/s²"}
 
 @dataclass(frozen=True)
 class Series:
-    """Samples of one quantity of one topic. kind: POSITION and the others. times_ns (n,) ascending; values (n, 3), or
-    (n, 4) xyzw.
+    """Samples of one quantity of one topic. kind: POSITION, ATTITUDE, RATE or ACCELERATION. times_ns (n,): ascending.
+    values (n, 3), or (n, 4) xyzw.
 
-    POSITION and ATTITUDE are of the tracked frame in the world; RATE and ACCELERATION are an IMU's, in the axes of the
-    tracked frame, the latter at the place of the IMU.
+    POSITION and ATTITUDE are of the tracked frame in the world. RATE and ACCELERATION are an IMU's, in the axes of the
+    tracked frame; the latter is at the place of the IMU.
     """
 
     topic: str
@@ -37,7 +37,7 @@ class Series:
 
     @property
     def name(self) -> str:
-        """Topic and quantity."""
+        """Names of topic and quantity."""
         return f"{self.topic} {self.kind}"
 
     def within(self, first_ns: int, last_ns: int) -> Series:
@@ -48,8 +48,8 @@ class Series:
 
 @dataclass(frozen=True)
 class SampledChanges:
-    """Where a load that was sampled at fixed times changed in between: before and after (e,) are the loads beside each
-    change, -1 for none, and sds_s (e,) [s] say how well its time is known.
+    """Times at which a sampled load changed between samples. before, after (e,): indices of the loads at each change,
+    -1 for none. sds_s (e,): standard deviations of the times [s].
     """
 
     before: IntArray = field(default_factory=lambda: np.zeros(0, np.int64))
@@ -62,8 +62,8 @@ class SampledChanges:
 
 @dataclass(frozen=True)
 class LoadHistory:
-    """Loads that acted: begin_ns (c,), end_ns (c,), the same for an impulse, and loads (c, LOAD), points
-    in the tracked frame. topic: whose clock these times are of, empty where they are exact.
+    """Loads that acted. begin_ns (c,), end_ns (c,): equal for an impulse. loads (c, LOAD): with points in the tracked
+    frame. topic: whose clock gives these times; empty if they are exact.
     """
 
     begin_ns: IntArray
@@ -73,7 +73,7 @@ class LoadHistory:
     changes: SampledChanges = field(default_factory=SampledChanges)
 
     def moved(self, offset_s: float, changes_s: FloatArray) -> LoadHistory:
-        """All loads later by an offset, and the sampled changes (e,) by their own, or as they are for none (0,)."""
+        """The loads delayed by an offset. changes_s: additional delays of the sampled changes (e,); (0,) for none."""
         offset = round(1e9 * offset_s)
         begin, end = self.begin_ns + offset, self.end_ns + offset
         acts = np.ones(len(begin), bool)
@@ -82,12 +82,12 @@ class LoadHistory:
             had, has = self.changes.before >= 0, self.changes.after >= 0
             end[self.changes.before[had]] += shifts[had]
             begin[self.changes.after[has]] += shifts[has]
-            # One that ends before it begins is none, and no impulse either.
+            # A load that would end before it begins is dropped; it isn't an impulse.
             acts = (end > begin) | (self.begin_ns == self.end_ns)
         return LoadHistory(begin[acts], end[acts], self.loads[acts])
 
     def within(self, first_ns: int, last_ns: int) -> Wrenches:
-        """Those that act between two times, from the first on."""
+        """The loads that act between two times, with times from the first."""
         impulse = self.begin_ns == self.end_ns
         acts = (self.begin_ns < last_ns) & np.where(impulse, self.begin_ns >= first_ns, self.end_ns > first_ns)
         begin, end = np.maximum(self.begin_ns[acts], first_ns), np.minimum(self.end_ns[acts], last_ns)
@@ -98,17 +98,16 @@ class LoadHistory:
 
 
 def load_history(rows: Sequence[tuple[int, int, FloatArray]] = ()) -> LoadHistory:
-    """Of (begin [ns], end [ns], load (LOAD,)); none for a free flight."""
+    """The loads of (begin [ns], end [ns], load (LOAD,)); none for a free flight."""
     begin, end = (np.array([row[k] for row in rows], np.int64) for k in (0, 1))
     return LoadHistory(begin, end, np.array([row[2] for row in rows]).reshape(-1, LOAD))
 
 
 @dataclass(frozen=True)
 class MeasuredFlight:
-    """One flight: where it is from, its series, the loads, gravity (3,) [m/s²] and damping [N s/m, N m s] as they are
-    known.
+    """One flight: its source, its series, the loads, and the known gravity (3,) [m/s²] and damping [N s/m, N m s].
 
-    gravity_from says from where.
+    gravity_from: source of the gravity.
     """
 
     name: str
@@ -121,22 +120,24 @@ class MeasuredFlight:
 
     @property
     def begin_ns(self) -> int:
-        """The first sample of all."""
+        """Time of the first sample [ns]."""
         return min(int(series.times_ns[0]) for series in self.series)
 
     @property
     def end_ns(self) -> int:
-        """The last sample of all."""
+        """Time of the last sample [ns]."""
         return max(int(series.times_ns[-1]) for series in self.series)
 
     @property
     def duration_s(self) -> float:
-        """From the first sample to the last [s]."""
+        """Time from the first sample to the last [s]."""
         return 1e-9 * (self.end_ns - self.begin_ns)
 
     @property
     def pose(self) -> tuple[Series, Series]:
-        """Positions and attitudes of the first topic that has both, with the same times; raises InputError without."""
+        """Positions and attitudes, with the same times, of the first topic that has both. Raises InputError if none
+        has.
+        """
         for attitude in self.series:
             for position in self.series:
                 if (attitude.kind, position.kind, position.topic) == (ATTITUDE, POSITION, attitude.topic):
@@ -144,15 +145,15 @@ class MeasuredFlight:
         raise InputError("session", f"{self.name} has no poses", "poses, transforms or odometry")
 
     def from_first_position(self) -> MeasuredFlight:
-        """The same with positions counted from the first: far from the world's origin their size would decide what the
-        least noise is.
+        """The flight with positions relative to the first: far from the world's origin their size would determine the
+        least noise.
         """
         first = self.pose[0].values[0]
         series = [replace(one, values=one.values - first) if one.kind == POSITION else one for one in self.series]
         return replace(self, series=tuple(series))
 
     def own(self, values: Values) -> Values:
-        """``values`` with the gravity and damping of this flight, where each has its own."""
+        """``values`` with this flight's own gravity and damping, where each flight has its own."""
         gravity, damping = values.gravity, values.damping
         if "gravity" in values.by_flight:
             gravity = np.array(self.gravity, float)
@@ -162,14 +163,14 @@ class MeasuredFlight:
 
     @cached_property
     def high_rate(self) -> float:
-        """Angular speed that four of five samples don't pass [rad/s]."""
+        """Angular speed that four of five samples don't exceed [rad/s]."""
         _, attitude = self.pose
         seconds = 1e-9 * np.diff(attitude.times_ns)
         return float(np.quantile(np.linalg.norm(rot.turns(attitude.values), axis=1) / seconds, 0.8))
 
 
 def topics_of(flights: Sequence[MeasuredFlight]) -> list[str]:
-    """Topics whose clocks may differ, in their order: those of poses first, as theirs is taken as right."""
+    """Topics whose clocks may differ, those of poses first, since their clock is the reference."""
     poses = [flight.pose[0].topic for flight in flights]
     sensors = [series.topic for flight in flights for series in flight.series]
     loads = [flight.load_history.topic for flight in flights if flight.load_history.topic]

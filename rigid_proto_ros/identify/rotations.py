@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Rotations of many samples at once, quaternions xyzw and rotation vectors."""
+"""Rotations of many samples at once: quaternions xyzw and rotation vectors."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from ..base.vectors import FloatArray, Points
 
 
 def cross(a: FloatArray, b: FloatArray) -> FloatArray:
-    """a × b of vectors (..., 3); numpy's own takes five times as long on small ones."""
+    """a × b of vectors (..., 3). numpy's own takes five times as long for small arrays."""
     x, y, z, u, v, w = a[..., 0], a[..., 1], a[..., 2], b[..., 0], b[..., 1], b[..., 2]
     return np.stack([y * w - z * v, z * u - x * w, x * v - y * u], axis=-1)
 
@@ -22,7 +22,7 @@ def product(a: FloatArray, b: FloatArray) -> FloatArray:
 
 
 def inverse(q: FloatArray) -> FloatArray:
-    """Of unit quaternions (..., 4)."""
+    """Inverse of unit quaternions (..., 4)."""
     return q * np.array([-1.0, -1.0, -1.0, 1.0], np.float64)
 
 
@@ -33,7 +33,7 @@ def exponential(vector: FloatArray) -> FloatArray:
 
 
 def logarithm(q: FloatArray) -> FloatArray:
-    """Rotation vectors (..., 3), of at most π, of unit quaternions (..., 4)."""
+    """Rotation vectors (..., 3), with lengths up to π, of unit quaternions (..., 4)."""
     q = np.where(q[..., 3:] < 0.0, -q, q)
     size = np.linalg.norm(q[..., :3], axis=-1, keepdims=True)
     angle = 2.0 * np.arctan2(size, q[..., 3:])
@@ -41,7 +41,7 @@ def logarithm(q: FloatArray) -> FloatArray:
 
 
 def turned(q: FloatArray, v: FloatArray) -> FloatArray:
-    """Vectors (..., 3) from body to world axes."""
+    """Vectors (..., 3) turned from body to world axes."""
     u, s = q[..., :3], q[..., 3:]
     t = 2.0 * cross(u, v)
     return v + s * t + cross(u, t)

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Our own sessions as measured flights: the states that were published, and the loads of the event log."""
+"""Sessions of this package as measured flights: the published states, and the loads of the event log."""
 
 from __future__ import annotations
 
@@ -19,10 +19,9 @@ from .measurements import ATTITUDE, POSITION, LoadHistory, MeasuredFlight, Serie
 def session_flight(
     session: RecordedSession, name: str, first_s: float, last_s: float
 ) -> tuple[MeasuredFlight, Scenario]:
-    """What was measured between two simulated times; raises InputError where something acted that can't be taken into
-    account.
+    """The measurements between two simulated times. Raises InputError if a load acted that can't be taken into account.
 
-    The tracked frame has the axes of the mesh and stands at the centre of mass that the scene says.
+    The tracked frame has the mesh's axes, and its origin is the scene's centre of mass.
     """
     scenario = session_scenario(session)
     setup = scenario.setup
@@ -49,7 +48,7 @@ def session_flight(
 
 
 def _series(session: RecordedSession) -> list[Series]:
-    """The poses, as one topic published them."""
+    """The poses as series of one topic."""
     topic = next((topic for topic in ("pose", "odom", "") if topic in session.states.topics), None)
     if topic is None:
         return []
@@ -62,7 +61,7 @@ def _series(session: RecordedSession) -> list[Series]:
 
 @dataclass
 class _Acting:
-    """A load (LOAD,) and when it acts [ns]; slot: what the next command of the same slot ends."""
+    """A load (LOAD,) and when it acts [ns]. slot: the next command in it ends this load."""
 
     begin_ns: int
     end_ns: int
@@ -73,7 +72,7 @@ class _Acting:
 def _load_history(
     session: RecordedSession, setup: Setup, frames: tuple[str, str], name: str, end_ns: int
 ) -> LoadHistory:
-    """Loads of the event log up to a time, as intervals; impulses are those that begin and end at once."""
+    """Loads of the event log up to a time, as intervals; an impulse ends when it begins."""
     impulses: list[tuple[int, int, FloatArray]] = []
     acting: list[_Acting] = []
     for number, line in enumerate(session.lines, 1):

@@ -1,6 +1,7 @@
 # SPDX-License-Identifier: MIT
-"""What is estimated: mass, centre of mass and tensor, and on request damping, gravity, clock offsets, an IMU's place
-and biases. Tensors are those that a body can have: their second moments Σ = ∫ x xᵀ dm have no eigenvalue below 0.
+"""The unknowns: mass, centre of mass and tensor, and on request damping, gravity, clock offsets, and an IMU's place and
+biases. Tensors are restricted to those of bodies that can exist: their second moments Σ = ∫ x xᵀ dm have no eigenvalue
+below 0.
 """
 
 from __future__ import annotations
@@ -18,12 +19,12 @@ from ..base.vectors import FloatArray, Matrix3, Vector3
 from ..mass.tensor import principal_axes
 
 GROUPS = ("mass", "inertia", "com", "damping", "gravity", "offset", "gyro_bias", "accel_bias", "imu_place")
-"""What ``--fit`` takes."""
+"""Groups of unknowns, as ``--fit`` names them."""
 DEFAULT_FIT = ("mass", "com", "inertia")
 _SIZES = {"mass": 1, "inertia": 6, "damping": 2}
-"""How many numbers a group has, where they aren't 3."""
+"""Number of unknowns in a group, if it isn't 3."""
 THINNEST = 1e-9
-"""Least second moment of an estimate, of the largest: of none at all there may be a rod, whose least moment is 0."""
+"""Least second moment of an estimate, relative to the largest. With 0 it could be a rod, whose least moment is 0."""
 
 
 @dataclass(frozen=True)
@@ -31,8 +32,9 @@ class Values:
     """mass [kg]; center_of_mass (3,) [m, tracked frame]; inertia (3, 3) [kg m², about the COM, axes of the tracked
     frame]; damping (2,): linear [N s/m], angular [N m s]; gravity (3,) [m/s²].
 
-    offsets [s] by topic: what is stamped t happened at t + offset. gyro_bias (3,) [rad/s], accel_bias (3,) [m/s²], and
-    imu_place (3,) [m, tracked frame] of the IMU. by_flight: ``gravity`` or ``damping``, where each flight has its own.
+    offsets [s] by topic: a sample stamped t was taken at t + offset. gyro_bias (3,) [rad/s], accel_bias (3,) [m/s²],
+    and imu_place (3,) [m, tracked frame]: of the IMU. by_flight: ``gravity`` or ``damping``, if each flight has its
+    own.
     """
 
     mass: float
@@ -52,13 +54,13 @@ class Values:
         return math.sqrt(float(np.trace(self.inertia) / self.mass))
 
     def offset(self, topic: str) -> float:
-        """Of a topic's clock [s]."""
+        """Offset of a topic's clock [s]."""
         return float(self.offsets.get(topic, 0.0))
 
 
 @dataclass(frozen=True)
 class Unknowns:
-    """Which numbers are free, in their order. slots: (group, index) of each; of ``offset`` the index is a topic."""
+    """The unknowns in their order. slots: (group, index) of each; for ``offset`` the index is a topic."""
 
     slots: tuple[tuple[str, Any], ...]
 
@@ -69,14 +71,14 @@ class Unknowns:
         return any(name == group for name, _ in self.slots)
 
     def scales(self, values: Values) -> FloatArray:
-        """What counts as a large change of each unknown (n,)."""
+        """A large change of each unknown (n,)."""
         mass, size = values.mass, values.size
         large = {"com": [size] * 3, "damping": [10.0 * mass, 10.0 * mass * size**2 / 3.0]}
         return np.array([large[group][index] if group in large else 1.0 for group, index in self.slots])
 
     def moved(self, values: Values, change: FloatArray) -> Values:
-        """``values`` with the unknowns changed (n,): the mass by a factor e^change, the tensor as ``moved_tensor``
-        says, all others by what is added to them. Where the tensor isn't an unknown it grows with the mass.
+        """``values`` with the unknowns changed (n,): the mass by a factor e^change, the tensor as in ``moved_tensor``,
+        all others by addition. If the tensor isn't an unknown, it is proportional to the mass.
         """
         by_group: dict[str, dict[Any, float]] = {}
         for (group, index), number in zip(self.slots, change.tolist(), strict=True):
@@ -98,12 +100,12 @@ class Unknowns:
         return replace(values, **new)
 
     def read(self, values: Values, slot: int) -> float:
-        """The number of an unknown other than mass and tensor."""
+        """Value of an unknown other than mass and tensor."""
         group, index = self.slots[slot]
         return values.offset(index) if group == "offset" else float(getattr(values, group)[index])
 
     def name(self, slot: int) -> str:
-        """Of an unknown other than mass, COM and tensor."""
+        """Name of an unknown other than mass, COM and tensor."""
         group, index = self.slots[slot]
         if group == "offset":
             return f"offset of {index}"
@@ -111,8 +113,8 @@ class Unknowns:
 
 
 def make_unknowns(fit: Sequence[str], topics: Sequence[str]) -> Unknowns:
-    """Of the groups in ``fit``; topics: those whose clocks may differ, of which the first keeps its own. Raises
-    InputError for a group that isn't known.
+    """The unknowns of the groups in ``fit``. topics: those whose clocks may differ; the first is the reference. Raises
+    InputError for an unknown group.
     """
     for group in fit:
         if group not in GROUPS:
@@ -120,7 +122,7 @@ def make_unknowns(fit: Sequence[str], topics: Sequence[str]) -> Unknowns:
     slots: list[tuple[str, Any]] = []
     for group in GROUPS:
         if group in fit:
-            # All clocks together say nothing but when the flight began: the first one is taken as right.
+            # A common offset of all clocks only shifts the flight in time, so the first clock is taken as right.
             slots += [(group, index) for index in (topics[1:] if group == "offset" else range(_SIZES.get(group, 3)))]
     if not slots:
         raise InputError("--fit", ",".join(fit), ", ".join(GROUPS) + "; an offset needs a second topic")
@@ -128,8 +130,9 @@ def make_unknowns(fit: Sequence[str], topics: Sequence[str]) -> Unknowns:
 
 
 def moved_tensor(inertia: Matrix3, change: FloatArray) -> Matrix3:
-    """A tensor (3, 3) changed (6,) in its own principal axes, each entry by the root of its two moments: the trace's
-    third, the last moment less the mean of the others, the second less the first, and products 23, 13, 12.
+    """The tensor (3, 3) changed (6,) in its own principal axes, each entry relative to the root of its two moments: a
+    third of the trace, the last moment minus the mean of the others, the second minus the first, and products 23, 13,
+    12.
     """
     moments, axes = principal_axes(inertia)
     size, ratio, smaller, turn23, turn13, turn12 = change.tolist()
@@ -140,7 +143,7 @@ def moved_tensor(inertia: Matrix3, change: FloatArray) -> Matrix3:
 
 
 def second_moments(inertia: Matrix3) -> Matrix3:
-    """∫ x xᵀ dm (3, 3) [kg m²] of a tensor: a body can have it where none of its eigenvalues is below 0."""
+    """∫ x xᵀ dm (3, 3) [kg m²] of a tensor. A body can have the tensor if no eigenvalue of it is below 0."""
     return 0.5 * float(np.trace(inertia)) * np.eye(3) - inertia
 
 
@@ -155,7 +158,7 @@ def possible_tensor(inertia: Matrix3, thinnest: float = THINNEST) -> Matrix3:
 
 
 def is_possible(inertia: Matrix3) -> bool:
-    """Whether a body can have it, to rounding."""
+    """Whether a body can have the tensor, within rounding."""
     values = np.linalg.eigvalsh(second_moments(inertia))
     return bool(values[0] >= -1e-12 * values[2])
 
@@ -168,14 +171,14 @@ _UNITS[np.arange(6), _ROWS, _COLUMNS] = _UNITS[np.arange(6), _COLUMNS, _ROWS] = 
 def possible_step(
     jacobian: FloatArray, residuals: FloatArray, tensor: slice, inertia: Matrix3, change: FloatArray
 ) -> FloatArray:
-    """The step (n,) with the least ``|jacobian step + residuals|`` that leads to a body that can exist. tensor: where
-    the six numbers of ``moved_tensor`` stand in it; so far they have changed ``inertia`` by ``change`` (6,).
+    """The step (n,) with the least ``|jacobian step + residuals|`` that leads to a body that can exist. tensor: slice
+    of the six numbers of ``moved_tensor`` in the step; they have so far changed ``inertia`` by ``change`` (6,).
 
-    Flat bodies lie on the rim of what can exist. There the second moments are S S with a symmetric S, which is regular
-    on the rim (Burer and Monteiro, Math. Program. 95, 2003).
+    Flat bodies are on the boundary of what can exist. There the second moments are S S with a symmetric S, which is
+    regular on the boundary (Burer and Monteiro, Math. Program. 95, 2003).
     """
     own, others = jacobian[:, tensor], np.delete(jacobian, np.r_[tensor], axis=1)
-    # The others take what they can, whatever the tensor is.
+    # The other unknowns fit what they can for any tensor.
     Q, _ = np.linalg.qr(others)
     left, aim = own - Q @ (Q.T @ own), residuals - Q @ (Q.T @ residuals)
     size = float(np.trace(inertia))
@@ -193,7 +196,7 @@ def possible_step(
         return left @ of_second @ changed
 
     values, axes = np.linalg.eigh(begin)
-    # Away from 0, where the root's slope is nothing.
+    # Away from 0, where the square root has no slope.
     root = ((axes * np.sqrt(np.maximum(values, 1e-6 * values[2]))) @ axes.T)[_ROWS, _COLUMNS]
     found = least_squares(lambda r: left @ step_to(r) + aim, root, slopes, method="lm", xtol=1e-10, ftol=1e-10)
     step = np.empty(jacobian.shape[1])

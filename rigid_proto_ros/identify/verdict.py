@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""What a motion identifies of a body: the directions in which its Fisher information vanishes, in physical words; and
+"""What a motion identifies of a body: the directions in which its Fisher information vanishes, in physical terms; and
 whether the residuals are noise.
 """
 
@@ -19,33 +19,30 @@ from .measurements import ATTITUDE, UNITS, MeasuredFlight
 from .unknowns import Unknowns, Values
 
 MOST_RELATIVE = 0.5
-"""A standard deviation of more than half of the quantity itself says nothing: neither the number nor its
-error is printed.
-"""
+"""Largest standard deviation relative to the quantity. Above it neither the number nor its error is printed."""
 LEAST_SHARE = 1e-3
-"""A quantity that changes by more than this part of itself along a direction that isn't identified isn't
-identified either.
-"""
+"""A quantity isn't identified if it changes by more than this fraction along a direction that isn't identified."""
 NAMED = 0.98
-"""Part of a named direction's square that must lie among those that aren't identified."""
+"""Least fraction of a named direction's square in the space that isn't identified."""
 DOUBTED = 0.01
-"""Standard deviations above this are tried out: a spin whose wobble is only noise seems to identify too much."""
+"""Standard deviations above this are verified: a spin whose wobble is only noise seems to identify too much."""
 TRIED = 4.0
-"""So many standard deviations away the fit is tried again, with other starts."""
+"""Distance at which the fit is repeated, with other starts [standard deviations]."""
 LEAST_RISE = 4.0
-"""Of the sum of squares there, where sixteen is expected."""
+"""Least rise of the sum of squares there; sixteen is expected."""
 GRADIENT_STEP = 2e-6
-"""Of quantities, part of what counts as a large change of an unknown."""
+"""Step of the derivatives of quantities, in units in which 1 is a large change of an unknown."""
 
 LAGS = 10
-"""Of the residuals' autocorrelation."""
+"""Number of lags of the residuals' autocorrelation."""
 LEAST_PROBABILITY = 1e-4
-"""Of noise that is white looking so little like it: below it the check fails."""
+"""Least probability of white noise with such an autocorrelation; below it the check fails."""
 TOO_LARGE = 1.5
-"""Residuals so many times the noise between neighbouring samples are no noise."""
+"""Residuals larger than this multiple of the noise between neighbouring samples are not noise."""
 LOST = 0.3
-"""Residuals of attitudes [rad] above which the fit doesn't follow them, however white they are: the body turned too far
-between samples."""
+"""Largest residual of attitudes [rad]. Above it the fit doesn't follow them, even if the residuals are white: the body
+turned too far between samples.
+"""
 
 POKE = "one poke of a known force beside the centre of mass"
 TUMBLE = "a motion that tumbles about several axes"
@@ -59,12 +56,14 @@ COORDINATES = {
 }
 """Axes 1, 2, 3 are those of the moments, ascending; x, y, z those of the tracked frame."""
 SMALL_UNITS = {"offset": 0.01, "gyro_bias": 0.1, "imu_place": 0.1}
-"""Of what a standard deviation is to be small for it to be identified, where that isn't 1: s, rad/s, m."""
+"""Scale of an unknown, if it isn't 1, below which its standard deviation must be small for it to be identified: s,
+rad/s, m.
+"""
 
 
 @dataclass(frozen=True)
 class Unidentified:
-    """A direction that isn't identified: what it is, and what would identify it."""
+    """A direction that isn't identified, and what would identify it."""
 
     what: str
     remedy: str
@@ -72,7 +71,7 @@ class Unidentified:
 
 @dataclass(frozen=True)
 class Quantity:
-    """A number with its standard deviation; both None where it isn't identified."""
+    """A number with its standard deviation; both are None if it isn't identified."""
 
     value: float | None
     sd: float | None
@@ -82,11 +81,11 @@ class Identifiability:
     """Which directions of the unknowns the flights identify, in coordinates in which 1 is a large change."""
 
     def __init__(self, estimate: Estimate, length: float) -> None:
-        """length: by which an error of the centre of mass is called large [m]."""
+        """length: an error of the centre of mass by this length is large [m]."""
         self.unknowns, self.values = estimate.unknowns, estimate.values
         self.names, self._units = _coordinates(estimate.unknowns, estimate.values, length)
         _, self.roots, directions = np.linalg.svd(estimate.root * self._units)
-        # Fewer rows than columns: the rest of the directions has no information at all.
+        # With fewer rows than columns, the remaining directions have no information.
         self.roots = np.append(self.roots, np.zeros(len(self.names) - len(self.roots)))
         self._directions = directions.T
         self._unidentified = self.roots < 1.0 / MOST_RELATIVE
@@ -96,13 +95,13 @@ class Identifiability:
 
     @cached_property
     def unidentified(self) -> list[Unidentified]:
-        """The directions that aren't identified, named."""
+        """The directions that aren't identified, with names."""
         space = self._directions[:, self._unidentified]
         found: list[Unidentified] = []
         for name, vector in zip(self.names, np.eye(len(self.names)), strict=True):
             if space.shape[1] and np.sum((space.T @ vector) ** 2) > NAMED:
                 found.append(Unidentified(name, _remedy(name)))
-                # What is left of the space is at right angles to it.
+                # The rest of the space, orthogonal to it.
                 left, sizes, _ = np.linalg.svd(space - np.outer(vector, vector @ space), full_matrices=False)
                 space = left[:, sizes > 0.5]
         for direction in space.T:
@@ -111,8 +110,8 @@ class Identifiability:
         return found
 
     def quantities(self, of: Callable[[Values], Numbers]) -> list[Quantity]:
-        """Numbers that the estimate gives with their standard deviations, or nothing where a direction that isn't
-        identified changes one.
+        """Numbers of the estimate with their standard deviations; None for one that changes along a direction that
+        isn't identified.
         """
         numbers = of(self.values)
         gradients = np.empty((len(numbers), len(self.unknowns)))
@@ -132,7 +131,7 @@ class Identifiability:
 
 
 def _coordinates(unknowns: Unknowns, values: Values, length: float) -> tuple[list[str], FloatArray]:
-    """Names of the unknowns, and what is much of each (n,)."""
+    """Names of the unknowns, and a large change of each (n,)."""
     names, units = [], []
     for k, (group, index) in enumerate(unknowns.slots):
         names.append(COORDINATES[group][index] if group in COORDINATES else unknowns.name(k).replace("_", " "))
@@ -157,8 +156,8 @@ def _remedy(name: str) -> str:
 
 @dataclass(frozen=True)
 class ResidualCheck:
-    """noise: standard deviation as estimated. by_differences: what neighbouring samples say it is. probability: of
-    white noise looking so (Ljung and Box).
+    """The check of one series. noise: estimated standard deviation. by_differences: the same from neighbouring samples.
+    probability: that white noise looks like this (Ljung and Box).
     """
 
     flight: str
@@ -171,7 +170,7 @@ class ResidualCheck:
 
     @property
     def is_white(self) -> bool:
-        """Whether nothing speaks against white noise."""
+        """Whether the residuals are compatible with white noise."""
         return self.probability >= LEAST_PROBABILITY
 
     @property
@@ -182,7 +181,7 @@ class ResidualCheck:
 
     @property
     def remarks(self) -> list[str]:
-        """What it shows, in sentences; empty when all is noise."""
+        """Sentences on the result; empty if the residuals are noise."""
         if self.is_noise:
             return []
         residuals = f"{self.series} of {self.flight}: the residuals of {self.noise:.3g} {self.unit}"
@@ -198,7 +197,7 @@ class ResidualCheck:
 
 
 def check_residuals(flights: Sequence[MeasuredFlight], estimate: Estimate) -> list[ResidualCheck]:
-    """Of every series of every flight."""
+    """Check every series of every flight."""
     found = []
     for flight, segment, start in zip(flights, estimate.problem.segments, estimate.starts, strict=True):
         for series, residuals in zip(segment.series, residuals_of(segment, start, estimate.values), strict=True):

@@ -1,4 +1,4 @@
 # SPDX-License-Identifier: MIT
-"""Builds the exported kernels ahead: a shared library for this machine, a module for WebAssembly. Nothing imports this
-folder; ``python -m rigid_proto_ros.kernels`` runs it.
+"""Build exported kernels ahead of time: a shared library for this machine, and a module for WebAssembly. No other
+package imports this one; ``python -m rigid_proto_ros.kernels`` runs it.
 """

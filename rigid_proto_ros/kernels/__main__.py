@@ -1,11 +1,10 @@
 # SPDX-License-Identifier: MIT
-"""``python -m rigid_proto_ros.kernels [TARGET ...]``: build the kernels ahead into the user's cache.
+"""``python -m rigid_proto_ros.kernels [TARGET ...]``: build the kernels ahead of time into the user's cache.
 
 TARGET: ``native``, this machine's processor (the default); ``wasm``; x86-64-v4, -v3, -v2 or aarch64; or ``wheel``, all
-kinds of processors of this machine's architecture, into the package, as a wheel carries them. What is there for the
-present sources isn't built again.
-``--typescript FILE`` writes what a page calls the kernels by, and with ``wasm`` the layouts of records are beside the
-module as ``kernels.json``.
+kinds of processors of this machine's architecture, into the package, for a wheel. Files that exist for the present
+sources are not built again. ``--typescript FILE`` writes the page's interface to the kernels. With ``wasm`` the layouts
+of records are written beside the module as ``kernels.json``.
 """
 
 from __future__ import annotations
@@ -29,11 +28,11 @@ from ..base.files import whole_file
 from ..base.library import KINDS, carried_folder, check_own, file_name, kernels_folder, stamp, target
 
 UNUSED_DAYS = 30
-"""After so long without use, kernels of other sources are removed."""
+"""Kernels of other sources are removed after this time without use."""
 
 
 def main() -> int:
-    """Build what is asked for; returns the exit status."""
+    """Build the requested targets. Returns the exit status."""
     parser = argparse.ArgumentParser(prog="python -m rigid_proto_ros.kernels", description="Build the kernels ahead.")
     parser.add_argument("targets", nargs="*", metavar="TARGET", default=["native"])
     parser.add_argument("--typescript", metavar="FILE")
@@ -66,7 +65,7 @@ def kinds_of(name: str) -> list[str]:
 
 @contextmanager
 def alone(folder: Path) -> Iterator[None]:
-    """Wait for others that build into this folder, and keep them waiting."""
+    """Hold a lock on this folder; wait for other processes that build into it."""
     with open(folder / "lock", "w") as lock:
         fcntl.flock(lock, fcntl.LOCK_EX)
         yield
@@ -83,15 +82,15 @@ def build(kinds: list[str], folder: Path) -> None:
             line = f"\r\033[Kkernels: {done} of {count}, {time.monotonic() - began:.0f} s"
             print(line, end="", file=sys.stderr, flush=True)
 
-    # What a user has set for numba would change the code. Optimized code has intrinsics of this processor. numba and
-    # the package's modules read these when they are imported.
+    # The user's settings for numba would change the code, and optimized code would contain intrinsics of this
+    # processor. numba and the package's modules read these variables when they are imported.
     for name in [name for name in os.environ if name.startswith("NUMBA_")]:
         del os.environ[name]
     os.environ.update(NUMBA_OPT="0", RIGID_PROTO_KERNELS="building")
     from .lowering import lowered
     from .targets import TARGETS, linked, object_code
 
-    gc.disable()  # it would search what numba keeps again and again
+    gc.disable()  # it would search numba's many objects again and again
     kept = Path(kernels_folder()) / stamp()
     kept.mkdir(mode=0o700, parents=True, exist_ok=True)
     whole = lowered(kept / "kernels.bc", told)
@@ -106,7 +105,9 @@ def build(kinds: list[str], folder: Path) -> None:
 
 
 def remove_unused(kept: Path) -> None:
-    """Remove kernels beside ``kept`` of which no file was read or written for UNUSED_DAYS. Others' folders stay."""
+    """Remove folders beside ``kept`` whose kernels were neither read nor written for UNUSED_DAYS. Other folders
+    stay.
+    """
     oldest = time.time() - UNUSED_DAYS * 86_400
     for folder in kept.parent.iterdir():
         if folder == kept or not re.fullmatch(r"\d+-[0-9a-f]{20}", folder.name):
@@ -118,8 +119,8 @@ def remove_unused(kept: Path) -> None:
 
 
 def describe(layouts: Path, typescript: str | None) -> None:
-    """Write the layouts of records, and the page's file if one is asked for. Raises InputError and OSError."""
-    os.environ.setdefault("RIGID_PROTO_KERNELS", "interpreted")  # to describe them, kernels needn't run
+    """Write the layouts of records and, if requested, the page's interface. Raises InputError and OSError."""
+    os.environ.setdefault("RIGID_PROTO_KERNELS", "interpreted")  # kernels need not run to be described
     from .layouts import as_json
     from .typescript import source
 
@@ -131,7 +132,7 @@ def describe(layouts: Path, typescript: str | None) -> None:
 
 
 def size(file: Path) -> str:
-    """Size of a file, as it is and compressed."""
+    """Size of a file in kB, uncompressed and compressed."""
     content = file.read_bytes()
     return f"{len(content) / 1e3:.0f} kB ({len(gzip.compress(content)) / 1e3:.0f} gzipped)"
 

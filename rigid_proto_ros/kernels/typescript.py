@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""TypeScript that reads and writes records in the memory of the WebAssembly module, and calls its kernels."""
+"""TypeScript code that reads and writes records in the memory of the WebAssembly module and calls its kernels."""
 
 from __future__ import annotations
 
@@ -150,14 +150,14 @@ _NUMBERS: dict[str, tuple[Any, str]] = {
     "tensor": (of_tensor, "NEARLY"),
     "scene": (record, "MAX_BALLASTS"),
 }
-"""Numbers that kernels know things by: of each part the module, and their names there."""
+"""Constants that kernels use as codes: by part, the module and the names in it."""
 _SUFFIX = {"f8": "F8", "f4": "F4", "i8": "I8", "i4": "I4", "u1": "U1", "b1": "B1"}
 _SHAPES = {1: ("Vector", ("n",)), 2: ("Matrix", ("n", "m")), 3: ("Array3", ("n", "m", "k"))}
 _RESERVED = {"default", "new", "function", "class", "var", "with", "in", "this", "delete", "case", "enum"}
 
 
 def source() -> str:
-    """The whole file."""
+    """Text of the whole file."""
     described = description()
     records, kernels = described["records"], described["kernels"]
     exports = "\n".join(f"  {name}(block: number): void;" for name in kernels)
@@ -176,12 +176,12 @@ def _numbers() -> str:
 
 
 def class_name(record: str) -> str:
-    """LoadRow of LOAD_ROW."""
+    """Name of a record's class: LoadRow for LOAD_ROW."""
     return record.title().replace("_", "")
 
 
 def camel(name: str) -> str:
-    """nowNs of now_ns."""
+    """Name of a variable: nowNs for now_ns."""
     first, *others = name.strip("_").split("_")
     joined = first + "".join(other.capitalize() for other in others)
     return f"{joined}_" if joined in _RESERVED else joined
@@ -235,7 +235,7 @@ def _slots(declared: str) -> int:
 
 
 def _kernel(name: str, of: dict[str, Any]) -> str:
-    """A method: it fills a block, calls the kernel and reads what it returns."""
+    """A method that fills a block, calls the kernel and reads the returned values."""
     returns, parameters, filling = of["returns"], [], []
     slot = len(returns)
     for argument, declared in of["arguments"].items():

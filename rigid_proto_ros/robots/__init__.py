@@ -1,2 +1,4 @@
 # SPDX-License-Identifier: MIT
-"""Robots: their files read, links judged by their shapes, inertials rewritten, a robot with held joints as one body."""
+"""Robots: read their files, judge links by their shapes, rewrite inertials, merge a robot with fixed joints into one
+body.
+"""

@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: MIT
-"""Which usual mistake turns the true tensor or COM of a link into the one that its file gives.
+"""Common mistakes that turn the true tensor or COM of a link into the one in its file.
 
-A mistake is a sentence and what it leads to. One of shape, frame or order may come together with a wrong unit.
+A mistake is a sentence and its result. A mistake of shape, frame or order may be combined with a wrong unit.
 """
 
 from __future__ import annotations
@@ -21,10 +21,10 @@ from ..mesh.solids import convex_hull
 from .link_shapes import LinkShapes, parallel_axis
 
 LIMIT = 1e-3
-"""Differences up to this are taken for rounding of printed numbers."""
+"""Relative differences up to this are taken as rounding of printed numbers."""
 ANOTHER_MASS = 0.02
-"""Part by which a tensor that is right but for a factor must be off to be called that of another mass: a little less
-or more is how real bodies differ from their drawings.
+"""Least relative deviation of a tensor's factor from 1 that is reported as another mass. Real bodies differ from their
+drawings by less.
 """
 
 _INCH, _POUND = 1.0 / 0.0254, 1.0 / 0.45359237
@@ -41,11 +41,12 @@ _FACTORS = {
     _POUND * _INCH**2: "tensor in lb in²",
 }
 _LARGEST_POWER = 9
-"""Of ten, by which a single entry may be off: from kg m² to g mm²."""
+"""Largest power of ten by which a single entry may be wrong: from kg m² to g mm²."""
 OTHER_SHAPES = "the bounding box", "the shell", "the convex hull"
 WEAK = ("COM left at the link's origin", "COM at the mesh's origin", *(f"COM that of {name}" for name in OTHER_SHAPES))
-"""Causes of a COM that are none by themselves: frames are often put at the COM on purpose, and the centres of other
-shapes lie near by."""
+"""Causes of a COM that count only together with another one: frames are often placed at the COM on purpose, and the
+centres of other shapes are close to it.
+"""
 
 
 _TURNS = [
@@ -54,28 +55,28 @@ _TURNS = [
     for signs in itertools.product((1.0, -1.0), repeat=3)
 ]
 _QUARTER_TURNS = [turn for turn in _TURNS if np.linalg.det(turn) > 0.0]
-"""The 24 rotations (3, 3) that take the axes to each other."""
+"""The 24 rotations (3, 3) that map the axes onto each other."""
 
 
 def _other_shapes(parts: LinkShapes, mass: float) -> Iterator[tuple[str, MassProperties]]:
-    """What other tools and habits put in the place of the solid, in the link's axes."""
+    """Shapes that other tools use in place of the solid, in the link's axes."""
     box, shell, hull = OTHER_SHAPES
     yield box, parts.box(mass)
-    with contextlib.suppress(InputError):  # of primitives
+    with contextlib.suppress(InputError):  # for primitives
         yield shell, parts.shell(mass)
-    with contextlib.suppress(InputError):  # of points in one plane
+    with contextlib.suppress(InputError):  # for points in one plane
         yield hull, MeshMoments(*convex_hull(parts.points)).mass_properties(mass=mass)
 
 
 def _mistakes(truth: MassProperties, stated: Vector3, parts: LinkShapes) -> Iterator[tuple[str, Matrix3]]:
-    """Each usual mistake, "" for none, and the tensor that it makes of the true one; stated (3,): the COM that the file
-    gives.
+    """Each common mistake, "" for none, with the tensor that it makes of the true one. stated (3,): the COM in the
+    file.
     """
     inertia, mass, com, use = truth.inertia, truth.mass, truth.center_of_mass, parts.first.pose
     yield "", inertia
     for name, of in _other_shapes(parts, mass):
         yield f"tensor of {name}, not of the solid", of.inertia
-    # The true tensor's six entries in another order or with other signs, or its axes exchanged.
+    # The six entries in another order or with other signs, or the axes exchanged.
     xx, xy, xz, yy, yz, zz = six_from_tensor(inertia)
     yield from _wrong_signs(inertia)
     orders = {
@@ -99,7 +100,7 @@ def _mistakes(truth: MassProperties, stated: Vector3, parts: LinkShapes) -> Iter
         yield f"axes {'xyz'[i]} and {'xyz'[j]} exchanged", exchanged
         quarter = f"a quarter turn about {'xyz'[3 - i - j]} left out (as between y up and z up)"
         yield quarter, exchanged * np.outer(flip, flip)
-    # About another point or in other axes.
+    # About another point, or in other axes.
     yield "taken about the link's origin, not about the COM", inertia + parallel_axis(mass, com)
     yield "taken about the mesh's origin, not about the COM", inertia + parallel_axis(mass, com - use.position)
     yield "taken about the stated origin, not about the COM", inertia + parallel_axis(mass, com - stated)
@@ -108,7 +109,7 @@ def _mistakes(truth: MassProperties, stated: Vector3, parts: LinkShapes) -> Iter
     moments, axes = np.linalg.eigh(inertia)
     for three in itertools.permutations(moments.tolist()):
         yield "principal moments on the diagonal, their axes left out", np.diag(three)
-    for turn in _QUARTER_TURNS:  # which axis is called first, and which way it points
+    for turn in _QUARTER_TURNS:  # any order and direction of the principal axes
         rotation = axes @ turn
         turned = rotation.T @ (turn.T @ np.diag(moments) @ turn) @ rotation
         yield "turned by the conjugate of the principal rotation", turned
@@ -117,8 +118,8 @@ def _mistakes(truth: MassProperties, stated: Vector3, parts: LinkShapes) -> Iter
 
 
 def _wrong_signs(inertia: Matrix3) -> list[tuple[str, Matrix3]]:
-    """Mistakes in the products' signs, and the tensors that they make; those that make the same one, since another
-    product is 0, in one sentence.
+    """Mistakes in the signs of the products, with the tensors that they give. Mistakes with the same result, since a
+    product is 0, are joined into one sentence.
     """
     xx, xy, xz, yy, yz, zz = six_from_tensor(inertia)
     sides = {f"a copy for the other side that wasn't mirrored in {axis}": axis for axis in "xyz"}
@@ -142,7 +143,9 @@ def _wrong_signs(inertia: Matrix3) -> list[tuple[str, Matrix3]]:
 
 
 def _one_entry(have: FloatArray, want: FloatArray) -> str:
-    """That one of six entries (6,) is a power of ten times the true one, the others right; "" where it isn't so."""
+    """Describe the one of six entries (6,) that is wrong by a power of ten while the others are right; "" if that isn't
+    so.
+    """
     wrong = np.flatnonzero(np.abs(have - want) > LIMIT * np.max(np.abs(want)))
     if len(wrong) != 1 or not have[wrong[0]] * want[wrong[0]] > 0.0:
         return ""
@@ -154,8 +157,8 @@ def _one_entry(have: FloatArray, want: FloatArray) -> str:
 
 
 def _unit(factor: float, density: float) -> str | None:
-    """Which wrong unit makes a tensor ``factor`` times too large: "" none, None no known one. density [kg/m³]: what the
-    true one has.
+    """The wrong unit that makes a tensor ``factor`` times too large: "" for none, None if it isn't known. density: that
+    of the true body [kg/m³].
     """
     if abs(factor - 1.0) <= LIMIT:
         return ""
@@ -169,9 +172,9 @@ def _unit(factor: float, density: float) -> str | None:
 
 
 def explain_inertia(given: Matrix3, truth: MassProperties, stated: Vector3, parts: LinkShapes) -> tuple[str, ...]:
-    """The fewest usual mistakes that turn the true tensor into ``given`` (3, 3); empty when none do.
+    """The smallest set of common mistakes that turns the true tensor into ``given`` (3, 3); empty if there is none.
 
-    stated (3,): the COM that the file gives [m, link axes].
+    stated (3,): the COM in the file [m, link axes].
     """
     if not np.any(given):
         return ("all entries zero",)
@@ -196,12 +199,12 @@ def explain_inertia(given: Matrix3, truth: MassProperties, stated: Vector3, part
 
 
 def _is_isotropic(inertia: Matrix3) -> bool:
-    """Whether a tensor is the same about every axis."""
+    """Whether all moments of a tensor are equal."""
     return bool(np.max(np.abs(inertia - inertia[0, 0] * np.eye(3))) <= 1e-9 * abs(inertia[0, 0]))
 
 
 def explain_center(given: Vector3, truth: MassProperties, parts: LinkShapes) -> tuple[str, ...]:
-    """The usual mistake that turns the true COM into ``given`` (3,) [m, link axes]; empty when none does."""
+    """The common mistake that turns the true COM into ``given`` (3,) [m, link axes]; empty if there is none."""
     com, use = truth.center_of_mass, parts.first.pose
     guesses = [
         (WEAK[0], np.zeros(3)),

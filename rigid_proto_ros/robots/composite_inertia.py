@@ -22,9 +22,10 @@ from .reading import COLLISION, NO_INERTIAL, VISUAL, Link, Pose, check_finite, c
 
 @dataclass(frozen=True)
 class Lump:
-    """``properties``: of all links together. vertices (n, 3), triangles (m, 3): their shapes. links: names and masses
-    of those that count. massless: names of links without an inertial; absent: why a shape isn't in the mesh. files: the
-    robot's own and those of its meshes that are found."""
+    """A robot as one body. properties: of all links together. vertices (n, 3), triangles (m, 3): their shapes. links:
+    names and masses of links with an inertial. massless: names of links without one. absent: why shapes aren't in the
+    mesh. files: the robot's file and those of its meshes that were found.
+    """
 
     properties: MassProperties
     vertices: Points
@@ -35,11 +36,12 @@ class Lump:
     files: tuple[Path, ...]
 
 
-@np.errstate(all="ignore")  # of numbers near the largest, which are refused
+@np.errstate(all="ignore")  # for numbers near the largest, which are refused
 def lump_robot(path: Path, folders: tuple[Path, ...] = ()) -> Lump:
-    """The robot with all joints at 0, in the frame of its root link (URDF), of the model (SDF) or of the world (MJCF).
+    """Merge a robot with all joints at 0, in the frame of its root link (URDF), of the model (SDF) or of the world
+    (MJCF).
 
-    Raises InputError for a file without inertials, and for links that make no tree.
+    Raises InputError for a file without inertials, and for links that don't form a tree.
     """
     robot = read_robot(path)
     search = Search(path.parent, folders)
@@ -77,8 +79,8 @@ def lump_robot(path: Path, folders: tuple[Path, ...] = ()) -> Lump:
 
 
 def _computed(link: Link, meshes: Meshes) -> Link:
-    """The link with the inertial that an SDF leaves to the simulator: its collision shapes at their densities, scaled
-    to the mass where it is given. Raises InputError for shapes that enclose no volume.
+    """The link with the inertial that an SDF leaves to the simulator: that of its collision shapes at their densities,
+    scaled to the mass if one is given. Raises InputError for shapes that enclose no volume.
     """
     if not link.computed:
         return link
@@ -91,8 +93,8 @@ def _computed(link: Link, meshes: Meshes) -> Link:
 
 
 def _merged(links: list[tuple[Link, Pose]], search: Search) -> tuple[Points, Triangles, tuple[str, ...]]:
-    """Vertices, triangles, and what is missing, of what the links show; of those that show nothing what they collide
-    with.
+    """Vertices and triangles of the visual shapes, or of the collision shapes of links without visual ones; and what is
+    missing.
     """
     vertices, triangles, count, absent = [np.zeros((0, 3))], [np.zeros((0, 3), np.int64)], 0, []
     for link, pose in links:
@@ -112,6 +114,6 @@ def _merged(links: list[tuple[Link, Pose]], search: Search) -> tuple[Points, Tri
 
 
 def obj_text(vertices: Points, triangles: Triangles) -> str:
-    """A mesh as an .obj file, with all digits."""
+    """A mesh as the text of an .obj file, with all digits."""
     points = "".join(f"v {x!r} {y!r} {z!r}\n" for x, y, z in vertices.tolist())
     return points + "".join(f"f {a} {b} {c}\n" for a, b, c in (triangles + 1).tolist())

@@ -1,25 +1,25 @@
 # SPDX-License-Identifier: MIT
-"""A verdict on each inertial of a robot file, the first of these words that holds:
+"""Verdicts on the inertials of a robot file. A verdict is the first of these that holds:
 
-* frame: mass 0 and no shape, as of a link that only marks a place;
+* frame: mass 0 and no shape, as for a link that only marks a frame;
 * impossible: no body has it (mass > 0, tensor positive definite, A + B >= C);
-* unknown: it can't be compared, for want of a shape that encloses a volume, or because something that the link shows
-  can't be found or read; or only its shapes condemn it, and no longer if meshes are turned upright as their files say;
-* uniform: it is the uniform solid's, to the tolerance and the digits printed;
-* explained: it isn't the uniform solid's, and a usual mistake turns that one into it (robots/causes.py); a COM at an
-  origin, or that of box, shell or hull, counts only beside a tensor that fits, that is explained, or that no mass
-  inside the shapes has;
-* not judged: all shapes are primitives, which often stand in for the parts that were weighed or drawn;
+* unknown: it can't be compared, because no shape encloses a volume, or a visual shape can't be found or read; or it is
+  wrong only by its shapes, and no longer if meshes are turned upright as their files say;
+* uniform: it is that of the uniform solid, within the tolerance and the digits printed;
+* explained: it isn't that of the uniform solid, and a common mistake explains the difference (robots/causes.py); a COM
+  at an origin, or that of box, shell or hull, counts only if the tensor fits, is explained, or is impossible for any
+  mass inside the shapes;
+* not judged: all shapes are primitives, which often replace the parts that were weighed or drawn;
 * impossible for its shape: no mass distribution inside the link's shapes has it;
-* not uniform: it isn't the uniform solid's, but some distribution inside the shapes has it.
+* not uniform: it isn't that of the uniform solid, but some distribution inside the shapes has it.
 
-The file's mass is taken as it is, so that the tensor and the COM are checked for themselves. What a link shows and what
-it collides with are compared each, and the one that counts is named; a mass distribution may lie in either. Collision
-shapes are often cruder than what they stand for: they condemn no link that shows a solid.
+The mass in the file is taken as given, so that tensor and COM are checked independently. Visual and collision shapes
+are compared separately, and the report names the ones that decide. A mass distribution may lie inside either. Collision
+shapes are often cruder than the parts, so they don't make a link wrong if its visual shapes are solids.
 
-Along an axis on which the shapes reach from l to u, a distribution of mean c has at most the variance (c - l)(u - c)
-(Bhatia and Davis, American Mathematical Monthly 107, 2000): all mass at the two ends. A tensor says the variance along
-every axis, so one axis on which it is larger shows that the inertial can't be of these shapes, whatever their density.
+Along an axis on which the shapes reach from l to u, a distribution with mean c has at most the variance (c - l)(u - c),
+with all mass at the two ends (Bhatia and Davis, American Mathematical Monthly 107, 2000). A tensor gives the variance
+along every axis. If it is larger along one axis, the inertial can't be that of these shapes, whatever their density.
 """
 
 from __future__ import annotations
@@ -47,22 +47,26 @@ from .reading import COLLISION, HERE, VISUAL, Link, Shape, check_finite, check_i
 IMPOSSIBLE, BEYOND_SHAPE, EXPLAINED = "impossible", "impossible for its shape", "explained"
 NOT_UNIFORM, NOT_JUDGED, UNIFORM, UNKNOWN, FRAME = "not uniform", "not judged", "uniform", "unknown", "frame"
 WRONG = (IMPOSSIBLE, BEYOND_SHAPE, EXPLAINED)
-"""Verdicts on inertials that nobody can have meant."""
+"""Verdicts of inertials that can't be intended."""
 VERDICTS = (*WRONG, NOT_UNIFORM, NOT_JUDGED, UNIFORM, UNKNOWN, FRAME)
-"""In the order of a report, the worst first."""
+"""Verdicts in the order of a report, the worst first."""
 MARGIN = 1e-3
-"""Part of the shapes' diagonal by which they may be larger than they are drawn."""
+"""Fraction of the shapes' diagonal by which parts may be larger than drawn."""
 MAX_ROUNDING = 0.05
-"""A number printed with one digit is right to 50 %, which would excuse anything: this much is excused at most."""
+"""Largest relative rounding that is excused: a number printed with one digit is accurate to 50 %, which would excuse
+anything.
+"""
 DIRECTIONS = 1000
-"""Axes tried over all directions, about 5 degrees apart, besides those of the link, of the tensor and of the hull."""
+"""Number of axes evenly spread over all directions, about 5 degrees apart, which are checked besides those of link,
+tensor and hull.
+"""
 
 
 @dataclass(frozen=True)
 class LinkDiagnosis:
-    """One link: ``status`` is one of VERDICTS; errors are relative (COM over the box's diagonal), ``ratio`` is the
-    tensor's size over that of the uniform solid; ``judged_by`` says whether by its visual or its collision shapes,
-    ``expected`` what they have as a uniform solid of the link's mass; ``info``: remarks without effect on the verdict.
+    """The verdict on one link. status: one of VERDICTS. Errors are relative (COM: to the box's diagonal). ratio: size
+    of the tensor relative to the uniform solid's. judged_by: visual or collision shapes. expected: their properties as
+    a uniform solid of the link's mass. info: remarks without effect on the verdict.
     """
 
     link: str
@@ -80,7 +84,7 @@ class LinkDiagnosis:
 
     @property
     def error(self) -> float:
-        """The larger of the errors."""
+        """The larger of the two errors."""
         return max(self.center_of_mass_error or 0.0, self.inertia_error or 0.0)
 
     def as_dict(self) -> dict[str, Any]:
@@ -94,7 +98,7 @@ class LinkDiagnosis:
 
 
 def impossible_inertial(link: Link) -> str:
-    """Why no body has the link's inertial; "" when one has."""
+    """Why no body can have the link's inertial; "" if one can."""
     remedy = "" if np.any(link.inertia) else "; a link that only marks a frame needs no inertial"
     if not link.mass > 0.0:
         return f"mass {link.mass:g}, which isn't a positive number{remedy}"
@@ -107,8 +111,8 @@ def impossible_inertial(link: Link) -> str:
 
 
 def beyond_shapes(link: Link, points: Points) -> str:
-    """Why no mass distribution within the hull of ``points`` (n, 3) has the link's inertial, which some body has; ""
-    when one may have.
+    """Why no mass distribution within the hull of ``points`` (n, 3) has the link's inertial; "" if one may have it. The
+    inertial is one of a possible body.
     """
     c = link.center_of_mass
     diagonal = float(np.linalg.norm(np.ptp(points, axis=0)))
@@ -123,7 +127,7 @@ def beyond_shapes(link: Link, points: Points) -> str:
     along = corners @ axes.T
     margin = np.abs(axes) @ reach
     below, above = axes @ c - along.min(axis=0) + margin, along.max(axis=0) - axes @ c + margin
-    outside = np.maximum(-below, -above)  # by how much the COM lies outside [m]
+    outside = np.maximum(-below, -above)  # distance of the COM from the hull's extent [m]
     if outside.max() > 0.0:
         axis = axes[outside.argmax()]
         return f"COM {outside.max() + MARGIN * diagonal:.3g} m outside the hull of its shapes along {_words(axis)}"
@@ -142,7 +146,7 @@ def beyond_shapes(link: Link, points: Points) -> str:
 
 
 def _spread(count: int) -> Points:
-    """``count`` directions (count, 3) spread evenly over the sphere: a Fibonacci lattice."""
+    """Directions (count, 3) spread evenly over the sphere: a Fibonacci lattice."""
     z = 1.0 - (2.0 * np.arange(count) + 1.0) / count
     angle = math.pi * (3.0 - math.sqrt(5.0)) * np.arange(count)
     r = np.sqrt(1.0 - z * z)
@@ -150,7 +154,9 @@ def _spread(count: int) -> Points:
 
 
 def _hull(points: Points) -> tuple[Points, Points]:
-    """Corners (n, 3) and normals (m, 3) of the hull; of points that have none, or without SciPy, all and none."""
+    """Corners (n, 3) and normals (m, 3) of the hull. For points without a hull, or without SciPy: all points and no
+    normals.
+    """
     try:
         corners, triangles = convex_hull(points)
     except InputError:
@@ -159,7 +165,7 @@ def _hull(points: Points) -> tuple[Points, Points]:
     normals = np.cross(b - a, c - a)
     size = np.linalg.norm(normals, axis=1)
     normals = np.unique(np.round(normals[size > 0.0] / size[size > 0.0][:, None], 3), axis=0)
-    normals = normals[:: max(1, len(normals) // 1000)]  # a smooth hull has more than are needed
+    normals = normals[:: max(1, len(normals) // 1000)]  # a smooth hull has more than needed
     return corners, normals / np.linalg.norm(normals, axis=1)[:, None]
 
 
@@ -168,9 +174,9 @@ def _words(axis: Vector3) -> str:
 
 
 def _tensor_error(link: Link, truth: MassProperties) -> tuple[float, float, float]:
-    """(relative difference of the tensor, how much of it the digits printed don't explain, ratio of the sizes)."""
+    """Relative difference of the tensor, the part of it that printed digits don't explain, and the ratio of sizes."""
     size = float(np.max(np.abs(truth.inertia)))
-    # A rounded mass changes the whole tensor by one factor, rounded entries change each by its own step.
+    # Rounding of the mass scales the whole tensor; rounding of an entry changes it by its own step.
     slack = min(link.mass_step / link.mass, MAX_ROUNDING)
     ratio = float(np.sum(link.inertia * truth.inertia) / np.sum(truth.inertia**2))
     factor = min(max(ratio, 1.0 - slack), 1.0 + slack)
@@ -180,7 +186,7 @@ def _tensor_error(link: Link, truth: MassProperties) -> tuple[float, float, floa
 
 
 def _compared(link: Link, parts: LinkShapes, tolerance: float, role: str) -> LinkDiagnosis:
-    """The link's inertial compared with that of its shapes of one role as a solid of one density."""
+    """Compare the link's inertial with that of its shapes of one role as a uniform solid."""
     plain = LinkDiagnosis(link.name, parts.names, UNKNOWN, link.mass, note=link.problem, judged_by=role)
     if not 0.0 < link.mass < math.inf:  # NaN for a link without an inertial
         return plain
@@ -205,9 +211,9 @@ def _compared(link: Link, parts: LinkShapes, tolerance: float, role: str) -> Lin
         inertia_left > tolerance,
         center_left > tolerance,
     ):
-        causes = ()  # by half they say nothing, where the shapes may be those of something else
-    # A COM at an origin, or that of the hull, is a slip where the tensor is that of the shapes, or a slip of it. Beside
-    # another tensor, as of a body weighed or computed with its densities, it may be right.
+        causes = ()  # a partial match means nothing if the shapes may be those of something else
+    # A COM at an origin, or that of the hull, is a mistake if the tensor is that of the shapes or a known mistake. With
+    # another tensor, as of a body that was weighed or computed with its densities, it may be right.
     is_weak = inertia_left > tolerance and not of_tensor and set(causes) <= set(WEAK)
     off = max(inertia_left, center_left) > tolerance
     density = link.mass / sum(solid.mass for solid in parts.solids)
@@ -226,8 +232,8 @@ def _compared(link: Link, parts: LinkShapes, tolerance: float, role: str) -> Lin
 
 
 def diagnose(link: Link, meshes: Meshes, tolerance: float = LIMIT) -> LinkDiagnosis:
-    """The verdict on a link, by what it shows or by what it collides with; unknown where anything
-    of what it shows, or of what it collides with where it shows nothing, can't be found or read.
+    """The verdict on a link by its visual or its collision shapes. Unknown if any visual shape can't be found or read,
+    or any collision shape of a link without visual ones.
     """
     if link.mass == 0.0 and not link.shapes:
         note = "mass 0 and no shape: it only marks a place" + ("; its tensor isn't 0" if np.any(link.inertia) else "")
@@ -260,9 +266,7 @@ def diagnose(link: Link, meshes: Meshes, tolerance: float = LIMIT) -> LinkDiagno
 
 
 def _judged(link: Link, readable: dict[str, LinkShapes], tolerance: float) -> tuple[LinkDiagnosis, LinkDiagnosis]:
-    """The diagnosis by the role's shapes that count, and the same once it is known whether these can have the link's
-    inertial.
-    """
+    """The diagnosis by the shapes that decide, without and with the check whether they can have the link's inertial."""
     found = [_compared(link, parts, tolerance, role) for role, parts in readable.items()]
     best = min(found, key=lambda one: _weight(one, readable[one.judged_by]))
     only_primitives = all(parts.are_primitives for parts in readable.values())
@@ -270,8 +274,8 @@ def _judged(link: Link, readable: dict[str, LinkShapes], tolerance: float) -> tu
 
 
 def missing_inertial(link: Link, meshes: Meshes, density: float) -> MassProperties:
-    """The inertial of a link that has none: of its visual shapes, or of its collision shapes where it has no others,
-    as solids of ``density`` [kg/m³]. Raises InputError where some can't be found or read, or bound no solid.
+    """The inertial of a link that has none: that of its visual shapes, or of its collision shapes if it has no others,
+    as solids of ``density`` [kg/m³]. Raises InputError if a shape can't be found or read, or encloses no solid.
     """
     shown = [shape for shape in link.shapes if shape.role == VISUAL]
     parts = meshes.parts(shown or link.shapes)
@@ -289,8 +293,9 @@ def _remarks(parts: LinkShapes) -> list[str]:
 
 
 def _weight(diagnosis: LinkDiagnosis, parts: LinkShapes) -> tuple[bool, ...]:
-    """Which of two diagnoses of a link stands, the smaller: one that finds it right; then that of meshes, since
-    primitives stand in for them; one that has numbers; that of what is shown, which is finer than what collides.
+    """Sort key of a link's diagnoses; the smallest decides. First comes one that finds the inertial uniform; then that
+    of meshes, since primitives replace meshes; then one with numbers; then that of visual shapes, which are finer than
+    collision shapes.
     """
     has_numbers = diagnosis.expected is not None
     return diagnosis.status != UNIFORM, parts.are_primitives, not has_numbers, diagnosis.judged_by == COLLISION
@@ -299,8 +304,8 @@ def _weight(diagnosis: LinkDiagnosis, parts: LinkShapes) -> tuple[bool, ...]:
 def _possible(
     link: Link, diagnosis: LinkDiagnosis, inside: list[Points], only_primitives: bool = False
 ) -> LinkDiagnosis:
-    """The diagnosis with the verdict that the link's inertial is impossible, or not judged, where it is; ``inside``:
-    points (n, 3) of the shapes.
+    """The diagnosis, with the verdict changed if the link's inertial is impossible or not judged. inside: points (n, 3)
+    of the shapes.
     """
     if link.problem:
         return diagnosis
@@ -322,7 +327,9 @@ def _possible(
 def _by_mesh(
     links: list[Link], mesh: str, scale: Vector3 | None, accept_open: float, tolerance: float
 ) -> LinkDiagnosis:
-    """The verdict on the one link with a shape of the mesh's name, or the only one with an inertial, by that mesh."""
+    """The verdict by a given mesh on the one link with a shape of its name, or else on the only link with an
+    inertial.
+    """
     body = mesh_body(load_mesh(mesh), accept_open=accept_open)
     shapes = [(link, shape) for link in links for shape in link.shapes if shape.kind == "mesh"]
     pairs = [(link, shape) for link, shape in shapes if Path(shape.file).stem == Path(body.mesh.path).stem]
@@ -337,7 +344,7 @@ def _by_mesh(
     return _possible(link, _compared(link, parts, tolerance, shape.role), [parts.points])
 
 
-@np.errstate(all="ignore")  # of numbers near the largest, which are judged
+@np.errstate(all="ignore")  # for numbers near the largest, which are judged
 def compare_robot(
     path: Path,
     *,
@@ -347,11 +354,11 @@ def compare_robot(
     accept_open: float = 0.0,
     tolerance: float = LIMIT,
 ) -> list[LinkDiagnosis]:
-    """Diagnoses of a file's links, the worst verdict and those farthest off first; with ``mesh`` of the one link that
-    the mesh belongs to, by that mesh at ``scale``. Meshes are looked for in ``folders``, too; relative differences up
-    to ``tolerance`` are taken for rounding.
+    """Diagnose a file's links; the worst verdicts and the largest errors come first. mesh: diagnose only the link that
+    it belongs to, by that mesh at ``scale``. folders: searched for meshes, too. tolerance: relative differences up to
+    it are taken as rounding.
 
-    Raises InputError when the file, or nothing in it, can be diagnosed.
+    Raises InputError if the file, or nothing in it, can be diagnosed.
     """
     links = read_robot(path).links
     if mesh is not None:

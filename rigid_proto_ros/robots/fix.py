@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Inertials of a robot file rewritten in its own bytes: each <inertial> is replaced, everything around it stays."""
+"""Rewrite inertials in the bytes of a robot file: each <inertial> is replaced, and everything around it stays."""
 
 from __future__ import annotations
 
@@ -22,24 +22,25 @@ from .reading import MAX_BYTES, NO_INERTIAL, Link, parse_xml, robot_of
 
 _WRITERS = {"robot": urdf_inertial, "sdf": sdf_inertial, "mujoco": mjcf_inertial}
 _REPLACED = {"origin", "pose", "mass", "inertia", *SIX}
-"""Elements of an <inertial> that the new one has, or needs no more."""
-_ATTRIBUTES = rb"""(?:"[^"]*"|'[^']*'|[^"'>])*"""  # a > between quotes ends no tag
+"""Elements of an <inertial> that the new one contains or makes unnecessary."""
+_ATTRIBUTES = rb"""(?:"[^"]*"|'[^']*'|[^"'>])*"""  # a > in quotes doesn't end a tag
 _INERTIAL = re.compile(
     rb"<!--.*?-->|<!\[CDATA\[.*?\]\]>|<\?.*?\?>|"
     rb"(?P<inertial><inertial(?=[\s/>])" + _ATTRIBUTES + rb"(?:(?<=/)>|>(?:<!--.*?-->|.)*?</inertial\s*>))",
     re.DOTALL,
 )
-"""An <inertial>, or what may hold one that is no element."""
+"""An <inertial>, or text that may contain one that is not an element."""
 _LINK = re.compile(
     rb"<!--.*?-->|<!\[CDATA\[.*?\]\]>|<\?.*?\?>|(?P<link><link(?=[\s/>])" + _ATTRIBUTES + rb">)", re.DOTALL
 )
-"""The start of a <link>, or what may hold one that is no element."""
+"""The start of a <link>, or text that may contain one that is not an element."""
 
 
 @dataclass(frozen=True)
 class FixedLink:
-    """One link as it was, and whether its inertial was rewritten; ``left``: why it wasn't though it isn't uniform, else
-    ""."""
+    """A link before the change, and whether its inertial was rewritten. left: why an inertial that isn't uniform was
+    not rewritten, otherwise "".
+    """
 
     before: LinkDiagnosis
     written: bool
@@ -47,7 +48,7 @@ class FixedLink:
 
 
 def _indent(data: bytes, start: int) -> bytes:
-    """The line break and white space before the byte ``start``, empty where something else stands before it."""
+    """The line break and white space before the byte ``start``; empty if something else precedes it."""
     line = data.rfind(b"\n", 0, start)
     if line < 0 or data[line:start].strip():
         return b""
@@ -55,7 +56,7 @@ def _indent(data: bytes, start: int) -> bytes:
 
 
 def _reason_to_leave(link: Link, diagnosis: LinkDiagnosis, places: dict[int, tuple[int, int]], everything: bool) -> str:
-    """Why a link that isn't uniform can't, or shan't, be written; "" when it can."""
+    """Why the inertial of a link that isn't uniform is not rewritten; "" if it is."""
     if diagnosis.status == NOT_UNIFORM and not everything:
         return "it is possible for its shapes; --all replaces it by that of the uniform solid"
     if diagnosis.status == NOT_JUDGED and not everything:
@@ -69,7 +70,7 @@ def _reason_to_leave(link: Link, diagnosis: LinkDiagnosis, places: dict[int, tup
 
 
 def _filled_in(link: Link, meshes: Meshes, density: float) -> tuple[MassProperties | None, str]:
-    """The inertial that a link is missing, or None and why it can't have one."""
+    """The inertial for a link without one, or None and the reason."""
     if link.owner is None:
         return None, f"{link.problem}; MuJoCo computes it from its geoms"
     try:
@@ -87,18 +88,18 @@ def fix_robot(
     everything: bool = False,
     density: float = 0.0,
 ) -> tuple[bytes, list[FixedLink]]:
-    """The file's bytes with every wrong inertial rewritten from the link's shapes, and what became of each link;
-    ``everything``: those that are possible, but not uniform, as well; ``density`` > 0 [kg/m³]: links without one get
+    """Rewrite every wrong inertial from the link's shapes. Returns the file's new bytes, and the result for each link.
+    everything: rewrite also those that are possible but not uniform. density > 0 [kg/m³]: links without an inertial get
     that of their shapes.
 
-    The mass stays; COM and tensor become those of a solid of one density. Raises InputError for a file that can't be
-    read, is xacro, or isn't written in ASCII's bytes.
+    The mass stays; COM and tensor become those of a uniform solid. Raises InputError for a file that can't be read, is
+    xacro, or isn't ASCII-compatible.
     """
     data = read_bounded(path, MAX_BYTES, "fix", "a URDF, SDF or MJCF file")
     root = parse_xml(data, path)
     if b"\0" in data:
         raise InputError("fix", path.name, "a file in UTF-8 or another ASCII-compatible encoding")
-    # Before the elements of included files are put into the tree by reading it.
+    # Before robot_of, which puts elements of included files into the tree.
     places = _places(root, "inertial", _INERTIAL, data, path)
     owners = _places(root, "link", _LINK, data, path) if density else {}
     links = robot_of(root, path).links
@@ -112,7 +113,7 @@ def fix_robot(
             made, reason = _filled_in(link, meshes, density)
             if made is not None:
                 start = owners[id(link.owner)][1]
-                blank = data[start : len(data) - len(data[start:].lstrip())]  # before whatever the link has first
+                blank = data[start : len(data) - len(data[start:].lstrip())]  # before the link's first element
                 text = write(made).rstrip().encode().replace(b"\n", _indent(blank + b"<", len(blank)))
                 changes.append((start, start, blank + text))
             fixed.append(FixedLink(diagnosis, made is not None, reason))
@@ -131,7 +132,7 @@ def fix_robot(
 
 
 def _places(root: Element, tag: str, pattern: re.Pattern[bytes], data: bytes, path: Path) -> dict[int, tuple[int, int]]:
-    """Where in the file's bytes each element of a tag, by its id, begins and ends, as ``pattern`` finds them."""
+    """Start and end in the file's bytes of each element with a tag, by the element's id, as ``pattern`` finds them."""
     found = [match.span() for match in pattern.finditer(data) if match[tag]]
     elements = list(root.iter(tag))
     if len(found) != len(elements):

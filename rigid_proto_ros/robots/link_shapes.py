@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""The shapes of a link put together as solids of one density: meshes, and primitives by closed form."""
+"""The shapes of a link as solids of one density: meshes, and primitives in closed form."""
 
 from __future__ import annotations
 
@@ -20,13 +20,13 @@ from ..mesh.reading import Mesh, load_mesh
 from .reading import Link, Pose, Shape, check_finite
 
 SEGMENTS = 48
-"""Corners of a round shape's circle; a multiple of 4, so that its box is exact."""
+"""Number of corners of a round shape's circle; a multiple of 4, so that its bounding box is exact."""
 NEAR = 1e-12
-"""Smallest size of a shape over its distance from the link's origin: of smaller ones, rounding leaves no shape."""
+"""Smallest ratio of a shape's size to its distance from the link's origin; below it rounding destroys the shape."""
 
 
 def check_shape(shape: Shape) -> None:
-    """Raise InputError for a shape that can't be taken."""
+    """Raises InputError for a shape that isn't supported."""
     named = shape.file or shape.kind
     if shape.problem:
         raise InputError(named, shape.problem)
@@ -37,10 +37,10 @@ def check_shape(shape: Shape) -> None:
 
 
 def primitive_solid(kind: str, size: tuple[float, ...]) -> MassProperties:
-    """A primitive of density 1 about its centre, ``size`` as in Shape."""
+    """Mass properties of a primitive of density 1 about its centre. size: as in Shape."""
     if kind == "box":
         volume = math.prod(size)
-        squares = volume * np.square(size) / 12.0  # the integrals of x², y², z²
+        squares = volume * np.square(size) / 12.0  # integrals of x², y², z²
     elif kind in ("sphere", "ellipsoid"):
         axes = np.array(size * 3 if kind == "sphere" else size)
         volume = 4.0 / 3.0 * math.pi * float(np.prod(axes))
@@ -50,7 +50,7 @@ def primitive_solid(kind: str, size: tuple[float, ...]) -> MassProperties:
         volume = math.pi * r * r * length
         squares = volume * np.array([r * r / 4.0, r * r / 4.0, length * length / 12.0])
     if kind == "capsule":
-        # Two half balls whose flat sides lie length/2 from the centre; their centroids 3r/8 beyond.
+        # Two hemispheres whose flat sides lie length/2 from the centre, and their centroids 3r/8 farther out.
         ball = 4.0 / 3.0 * math.pi * r**3
         across = ball * r * r / 5.0
         along = across + ball * (length * length / 4.0 + 2.0 * (length / 2.0) * (3.0 * r / 8.0))
@@ -59,12 +59,12 @@ def primitive_solid(kind: str, size: tuple[float, ...]) -> MassProperties:
 
 
 def primitive_surface(kind: str, size: tuple[float, ...]) -> tuple[Points, Triangles]:
-    """Vertices (n, 3) and outward triangles (m, 3) of a primitive about its centre, ``size`` as in Shape; round ones
-    are inscribed, with the same bounding box.
+    """Vertices (n, 3) and outward triangles (m, 3) of a primitive about its centre. Round ones are inscribed and have
+    the same bounding box. size: as in Shape.
     """
     from trimesh import creation
 
-    # Of unit size, since trimesh takes points closer than 1e-8 for one.
+    # Made at unit size, since trimesh merges points closer than 1e-8.
     if kind == "box":
         made, stretch = creation.box((1.0, 1.0, 1.0)), size
     elif kind in ("sphere", "ellipsoid"):
@@ -80,8 +80,8 @@ def primitive_surface(kind: str, size: tuple[float, ...]) -> tuple[Points, Trian
 
 
 def placed_surface(shape: Shape, mesh: Mesh | None) -> tuple[Points, Triangles]:
-    """Vertices (n, 3) and triangles (m, 3) of a shape, a mesh or for None a primitive, in the link's frame; raises
-    InputError where they aren't finite.
+    """Vertices (n, 3) and triangles (m, 3) of a shape in the link's frame. mesh: None for a primitive. Raises
+    InputError if they aren't finite.
     """
     if mesh is None:
         vertices, triangles = primitive_surface(shape.kind, shape.size)
@@ -100,23 +100,23 @@ def placed_surface(shape: Shape, mesh: Mesh | None) -> tuple[Points, Triangles]:
 
 
 def placed(body: MassProperties | Link, pose: Pose) -> MassProperties:
-    """A body that lies in another frame."""
+    """A body's mass properties transformed from the frame of ``pose``."""
     R = pose.rotation
     return MassProperties(body.mass, R @ body.center_of_mass + pose.position, R @ body.inertia @ R.T)
 
 
 def of_mass(body: MassProperties, mass: float) -> MassProperties:
-    """The same body, heavier or lighter."""
+    """The body scaled to another mass."""
     return replace(body, mass=mass, inertia=body.inertia * (mass / body.mass))
 
 
 def parallel_axis(mass: float, offset: Vector3) -> Matrix3:
-    """Inertia (3, 3) of a mass about a point that is ``offset`` (3,) away from it."""
+    """Inertia (3, 3) of a point mass about a point at the distance ``offset`` (3,)."""
     return mass * (offset @ offset * np.eye(3) - np.outer(offset, offset))
 
 
 def combined(bodies: Sequence[MassProperties], whole: str) -> MassProperties:
-    """Bodies as one, about their common COM; raises InputError where that has no finite mass above 0."""
+    """Bodies merged into one, about their common COM. Raises InputError if the total mass isn't finite and above 0."""
     mass = sum(body.mass for body in bodies)
     if not 0.0 < mass < math.inf:
         raise InputError(f"mass of {whole}", mass, "a finite mass or volume > 0")
@@ -127,15 +127,15 @@ def combined(bodies: Sequence[MassProperties], whole: str) -> MassProperties:
 
 
 class Meshes:
-    """The meshes that a robot's shapes name, each loaded once; accept_open as in ``mesh_body``."""
+    """The meshes that a robot's shapes name, each loaded once. accept_open: as in ``mesh_body``."""
 
     def __init__(self, search: Search, accept_open: float = 0.0) -> None:
         self._search = search
         self._body = functools.cache(lambda path: mesh_body(load_mesh(path), accept_open=accept_open))
 
     def _taken(self, shape: Shape) -> MeshBody | None:
-        """The body of a shape's mesh, None for a primitive; raises InputError that says whether it wasn't found or
-        can't be read.
+        """The body of a shape's mesh; None for a primitive. Raises InputError, which says whether the mesh wasn't found
+        or can't be read.
         """
         try:
             check_shape(shape)
@@ -150,7 +150,7 @@ class Meshes:
             raise InputError(f"{shape.role} mesh that can't be read", str(error)) from None
 
     def parts(self, shapes: Sequence[Shape]) -> LinkShapes:
-        """The shapes with their meshes; raises InputError for those that can't be taken, by name."""
+        """The shapes with their meshes. Raises InputError, which names one that can't be used."""
         taken, lost = [], []
         for shape in shapes:
             try:
@@ -167,12 +167,12 @@ _UPRIGHT = {
     "X": Pose(np.array([[0.0, -1.0, 0.0], [0.0, 0.0, 1.0], [1.0, 0.0, 0.0]]), np.zeros(3)),
     "Y": Pose(np.array([[1.0, 0.0, 0.0], [0.0, 0.0, -1.0], [0.0, 1.0, 0.0]]), np.zeros(3)),
 }
-"""Poses in which z is up of what a COLLADA file has with x or y up."""
+"""By the up axis of a COLLADA file, the pose that turns it to z."""
 
 
 class LinkShapes:
-    """Shapes, meshes with their body, in a link's frame; points (n, 3): their vertices, round primitives as inscribed
-    surfaces.
+    """Shapes in a link's frame, meshes with their body. points (n, 3): their vertices; round primitives are
+    inscribed.
     """
 
     def __init__(self, parts: list[tuple[Shape, MeshBody | None]]) -> None:
@@ -182,22 +182,22 @@ class LinkShapes:
 
     @property
     def names(self) -> str:
-        """What the shapes are called: mesh names and kinds."""
+        """Names of the meshes and kinds of the primitives."""
         return ", ".join(dict.fromkeys(body.mesh.name if body else shape.kind for shape, body in self.parts))
 
     @property
     def are_primitives(self) -> bool:
-        """Whether none of them is a mesh."""
+        """Whether none of the shapes is a mesh."""
         return all(body is None for _, body in self.parts)
 
     @property
     def diagonal(self) -> float:
-        """Diagonal of the box, in the link's axes, around all."""
+        """Diagonal of the bounding box of all shapes, in the link's axes [m]."""
         return float(np.linalg.norm(np.ptp(self.points, axis=0)))
 
     def upright(self) -> LinkShapes | None:
-        """The same with those meshes turned whose file says that another axis than z is up, which some programs do and
-        others don't; None where no file says so.
+        """The shapes with those meshes turned whose file declares an up axis other than z, as some programs do and
+        others don't. None if no file declares one.
         """
         turns = [_UPRIGHT.get(body.mesh.up_axis) if body else None for _, body in self.parts]
         if not any(turns):
@@ -209,7 +209,7 @@ class LinkShapes:
 
     @cached_property
     def solids(self) -> list[MassProperties]:
-        """Each shape as a solid of density 1, in the link's axes; raises InputError for a mesh that bounds none."""
+        """Each shape as a solid of density 1, in the link's axes. Raises InputError for a mesh that encloses none."""
         found = []
         for shape, body in self.parts:
             own = body and body.moments.mass_properties(scale=shape.scale, density=1.0)
@@ -217,17 +217,17 @@ class LinkShapes:
         return found
 
     def uniform(self, mass: float) -> MassProperties:
-        """``mass`` kg spread evenly over the shapes, what overlaps counted twice, in the link's axes."""
+        """``mass`` kg spread evenly over the shapes, in the link's axes; overlaps count twice."""
         return of_mass(combined(self.solids, self.names), mass)
 
     def summed_about_own_centers(self, mass: float) -> Matrix3:
-        """What comes out (3, 3) when the parts' tensors are added as if all had one centre of mass."""
+        """The sum of the parts' tensors (3, 3), each about its own centre, without the parallel axis terms."""
         volume = sum(solid.mass for solid in self.solids)
         return sum((solid.inertia for solid in self.solids), np.zeros((3, 3))) * (mass / volume)
 
     def shell(self, mass: float) -> MassProperties:
-        """``mass`` kg spread evenly over the surfaces of the meshes, in the link's axes; raises InputError where some
-        shapes are primitives.
+        """``mass`` kg spread evenly over the surfaces of the meshes, in the link's axes. Raises InputError if a shape
+        is a primitive.
         """
         found = []
         for shape, body in self.parts:
@@ -238,7 +238,7 @@ class LinkShapes:
         return of_mass(combined(found, self.names), mass)
 
     def box(self, mass: float) -> MassProperties:
-        """The box around all, in the first shape's axes, as a solid of ``mass`` kg."""
+        """The bounding box of all shapes, in the first shape's axes, as a solid of ``mass`` kg."""
         R = self.first.pose.rotation
         local = self.points @ R
         middle = R @ (0.5 * (local.min(axis=0) + local.max(axis=0)))

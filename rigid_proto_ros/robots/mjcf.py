@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""MJCF: bodies with geoms and inertials, as MuJoCo's own compiler takes default classes, frames, attached models and
+"""MJCF: bodies with geoms and inertials. MuJoCo's compiler resolves default classes, frames, attached models and
 orientations.
 """
 
@@ -18,13 +18,12 @@ from . import reading as rd
 from .mjcf_compiler import Question, ask
 
 MAX_INCLUDES = 200
-"""Of one model, the includes of included files counted."""
+"""Largest number of includes of a model, including nested ones."""
 
 
 def _include(parent: Element, main: Path, path: Path, left: Iterator[int]) -> None:
-    """Put the content of included files, named from the main file's folder or from that of ``path``, the file that
-    includes them, in the place of each <include>: MuJoCo itself takes no file twice. ``left``: how many more may
-    follow.
+    """Replace each <include> by the content of its file, since MuJoCo itself takes no file twice. File names are
+    relative to the folder of the main file, or of ``path``, the including file. left: counts the remaining includes.
     """
     for child in list(parent):
         if child.tag != "include":
@@ -42,7 +41,7 @@ def _include(parent: Element, main: Path, path: Path, left: Iterator[int]) -> No
 
 
 def read_mjcf(root: Element, path: Path) -> rd.Robot:
-    """The bodies of a <mujoco>; raises InputError for what MuJoCo refuses, and without it."""
+    """The bodies of a <mujoco>. Raises InputError for what MuJoCo refuses, and if MuJoCo isn't installed."""
     if importlib.util.find_spec("mujoco") is None:
         raise InputError("robot file", f"MJCF: {is_missing('mujoco', 'robots')}")
     inertials = {body.get("name", ""): body.find("inertial") for body in root.iter("body")}
@@ -50,10 +49,10 @@ def read_mjcf(root: Element, path: Path) -> rd.Robot:
         _include(root, path, path, iter(range(MAX_INCLUDES)))
     except RecursionError:
         raise InputError("robot file", path.name, "elements within each other as deep as MuJoCo takes them") from None
-    if any(not model.get("file") for model in root.iter("model")):  # MuJoCo may loop at a later file after such a one
+    if any(not model.get("file") for model in root.iter("model")):  # MuJoCo may loop at a later one
         raise InputError("robot file", path.name, "a file for each <model>")
     text = ElementTree.tostring(root, encoding="unicode")
     answer = ask(Question(text, path, inertials, simulated=False))
-    # An element is known by its place in the file, which a copy hasn't.
+    # Elements are identified by object, and the answer has copies.
     links = [link if link.element is None else replace(link, element=inertials[link.name]) for link in answer.links]
     return rd.Robot(links, lambda: answer.poses, lambda: ask(Question(text, path, inertials, simulated=True)).links)

@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: MIT
-"""What MuJoCo's compiler makes of an MJCF, asked in a process of its own: a small file may replicate to what takes
-hours and all memory, and nothing interrupts the compiler.
+"""MuJoCo's MJCF compiler in a separate process: a small file may replicate to a model that takes hours and all memory,
+and the compiler can't be interrupted.
 
-``main`` is that process. It reads a pickled Question, writes a pickled Answer, and ends at its limits of time and
+The process runs ``main``: it reads a pickled Question, writes a pickled Answer, and ends at its limits of time and
 memory.
 """
 
@@ -27,17 +27,17 @@ from ..base.interrupts import end_with_this_thread, with_this_package
 from . import reading as rd
 
 CPU_S = 10
-"""Time of a core for one file: 3000 bodies with a geom each take 3.4 s."""
+"""Limit of processor time for one file [s]: 3000 bodies with a geom each take 3.4 s."""
 WALL_S = 120.0
-"""For a machine that is busy with other things."""
+"""Limit of wall time [s], for a busy machine."""
 MEMORY_BYTES = 1 << 30
-"""Of address space; Python and MuJoCo alone take 143 MB."""
+"""Limit of address space; Python and MuJoCo alone take 143 MB."""
 
 
 @dataclass(frozen=True)
 class Question:
-    """An MJCF's text, files included; the file's path; its inertials by the bodies' names; whether links with the
-    masses that MuJoCo takes are asked for, or those of the file.
+    """text: an MJCF with its includes. path: of the file. inertials: elements by the names of bodies. simulated: ask
+    for links with the masses that MuJoCo uses instead of those in the file.
     """
 
     text: str
@@ -48,8 +48,8 @@ class Question:
 
 @dataclass(frozen=True)
 class Answer:
-    """Links, and the poses of the bodies in the world by name; ``refused``: what of the question is wrong and why,
-    where it has no answer.
+    """Links, and the poses of the bodies in the world by name. refused: field and reason if the question has no
+    answer.
     """
 
     links: list[rd.Link]
@@ -58,9 +58,11 @@ class Answer:
 
 
 def ask(question: Question) -> Answer:
-    """The answer of a new process; raises InputError for what MuJoCo refuses, or doesn't finish within the limits."""
+    """Answer a question in a new process. Raises InputError for what MuJoCo refuses or doesn't finish within the
+    limits.
+    """
     environment = {**with_this_package(), "OPENBLAS_NUM_THREADS": "1"}
-    # -P: nothing is imported from the working folder, which may be a stranger's.
+    # -P: nothing is imported from the working folder, which may hold a stranger's files.
     command = [sys.executable, "-P", "-c", "from rigid_proto_ros.robots.mjcf_compiler import main; main()"]
     try:
         done = subprocess.run(
@@ -74,7 +76,7 @@ def ask(question: Question) -> Answer:
         )
     except subprocess.TimeoutExpired:
         raise _beyond_limits(question) from None
-    if done.returncode < 0:  # ended by a signal: of its limits, or of a fault in the compiler
+    if done.returncode < 0:  # ended by a signal: at its limits, or by a fault in the compiler
         raise _beyond_limits(question)
     if done.returncode > 0:
         raise RuntimeError(done.stderr.decode(errors="replace"))
@@ -90,35 +92,35 @@ def _beyond_limits(question: Question) -> InputError:
 
 
 def _limit() -> None:
-    """Let this process end at its limits."""
+    """Set the limits of this process."""
     try:
         import resource
-    except ImportError:  # Windows
+    except ImportError:  # on Windows
         return
     resource.setrlimit(resource.RLIMIT_CPU, (CPU_S, CPU_S))
-    with contextlib.suppress(ValueError, OSError):  # macOS has none of memory
+    with contextlib.suppress(ValueError, OSError):  # macOS has no limit of memory
         resource.setrlimit(resource.RLIMIT_AS, (MEMORY_BYTES, MEMORY_BYTES))
 
 
 class _Source:
-    """A model's text, and what MuJoCo makes of it; files that it names are looked for beside it."""
+    """A model's text and MuJoCo's reading of it. Files that it names are searched in the folder of ``path``."""
 
     def __init__(self, text: str, path: Path) -> None:
         import mujoco
 
         self.mujoco: Any = mujoco
-        mujoco.set_mju_user_warning(lambda _: None)  # which would be written into a file beside the robot
+        mujoco.set_mju_user_warning(lambda _: None)  # warnings would be written into a file in the robot's folder
         self.text = text
         self.path = path
 
     def parsed(self) -> Any:
-        """A new MjSpec: what the file says, default classes applied, models attached, nothing computed."""
+        """A new MjSpec of the file, with default classes applied and models attached; nothing is computed."""
         with self._refusing("reads"):
             spec = self.mujoco.MjSpec.from_string(self.text)
-        spec.compiler.fusestatic = spec.compiler.discardvisual = False  # which would drop bodies and geoms
+        spec.compiler.fusestatic = spec.compiler.discardvisual = False  # they would drop bodies and geoms
         spec.compiler.usethread = False  # each thread takes address space
         for joint in spec.joints:
-            joint.align = False  # which would move a body's frame into its principal axes
+            joint.align = False  # it would move a body's frame into its principal axes
         self._delete(spec, "keys sensors actuators equalities tendons pairs excludes skins tuples")
         return spec
 
@@ -128,7 +130,7 @@ class _Source:
                 spec.delete(element)
 
     def without_files(self) -> Any:
-        """A new spec whose meshes, height fields and textures are gone: small spheres stand where they were."""
+        """A new spec with small spheres in place of meshes, height fields and textures."""
         spec = self.parsed()
         drawn = self.mujoco.mjtGeom
         for geom in spec.geoms:
@@ -141,9 +143,9 @@ class _Source:
         return spec
 
     def compiled(self, spec: Any) -> Any:
-        """The MjModel of a spec."""
+        """Compile a spec to an MjModel."""
         with self._refusing("compiles"), warnings.catch_warnings():
-            warnings.simplefilter("ignore")  # of attributes that will be dropped some day
+            warnings.simplefilter("ignore")  # for attributes that will be removed
             return spec.compile()
 
     @contextlib.contextmanager
@@ -153,13 +155,13 @@ class _Source:
                 yield
         except MemoryError:
             raise
-        except Exception as error:  # MuJoCo raises others, too, for a file that it doesn't expect
+        except Exception as error:  # MuJoCo raises other exceptions, too, for an unexpected file
             reason = " ".join(str(error).replace("XML Error:", "").replace("Error:", "").split())
             raise InputError("robot file", self.path.name, f"what MuJoCo {verb} ({reason})") from None
 
 
 def _shape(spec: Any, raw: Any, meshes: dict[str, Any], model: Any, number: int) -> rd.Shape | None:
-    """The shape of a geom, raw as the file has it, at its compiled place; None for those that are no solid."""
+    """The shape of a geom, ``raw`` as the file has it, at its compiled pose. None for a geom that isn't a solid."""
     kind = str(raw.type).rpartition("_")[2].lower()
     if kind in ("plane", "hfield"):
         return None
@@ -186,7 +188,7 @@ def _shape(spec: Any, raw: Any, meshes: dict[str, Any], model: Any, number: int)
 
 
 def _link(spec: Any, body: Any, name: str, shapes: list[rd.Shape | None], inertial: Element | None) -> rd.Link:
-    """A body with the inertial that the file has."""
+    """A body with the inertial in the file."""
     bare = rd.Link(name, tuple(filter(None, shapes)))
     if not body.explicitinertial:
         return bare
@@ -205,7 +207,7 @@ def _link(spec: Any, body: Any, name: str, shapes: list[rd.Shape | None], inerti
 
 
 def _poses(model: Any, names: list[str]) -> dict[str, rd.Pose]:
-    """Poses of the bodies in the world, as the file has them."""
+    """Poses of the bodies in the world, as the file gives them."""
     poses = [rd.HERE]
     for body in range(1, model.nbody):
         own = rd.Pose(rd.rotation_from_wxyz(model.body_quat[body]), model.body_pos[body])
@@ -214,10 +216,12 @@ def _poses(model: Any, names: list[str]) -> dict[str, rd.Pose]:
 
 
 def _simulated(source: _Source, links: list[rd.Link], names: list[str]) -> list[rd.Link]:
-    """The links with the masses that MuJoCo takes: of its <compiler>, and of the geoms where there are no inertials."""
+    """The links with the masses that MuJoCo uses: those of its <compiler>, and of the geoms where inertials are
+    missing.
+    """
     spec = source.parsed()
     always = source.mujoco.mjtInertiaFromGeom.mjINERTIAFROMGEOM_TRUE
-    from_geoms = any(body.compiler.inertiafromgeom == always for body in spec.bodies)  # attached ones have their own
+    from_geoms = any(body.compiler.inertiafromgeom == always for body in spec.bodies)  # attached models have their own
     if not from_geoms and all(body.explicitinertial or not body.geoms for body in spec.bodies[1:]):
         spec = source.without_files()
     model = source.compiled(spec)
@@ -237,10 +241,10 @@ def _simulated(source: _Source, links: list[rd.Link], names: list[str]) -> list[
 
 
 def answered(question: Question) -> Answer:
-    """The answer, found in this process."""
+    """Compute the answer in this process."""
     source = _Source(question.text, question.path)
     spec, frames = source.parsed(), source.without_files()
-    for body in frames.bodies[1:]:  # what the file says of inertials may be what MuJoCo refuses
+    for body in frames.bodies[1:]:  # MuJoCo may refuse the inertials in the file
         body.explicitinertial, body.mass, body.inertia = True, 1.0, [1.0, 1.0, 1.0]
         body.fullinertia = [np.nan, 0.0, 0.0, 0.0, 0.0, 0.0]
     model = source.compiled(frames)
@@ -259,7 +263,7 @@ def answered(question: Question) -> Answer:
 def main() -> None:
     """Answer the question on standard input."""
     answers = os.dup(1)
-    os.dup2(2, 1)  # for whatever a library prints
+    os.dup2(2, 1)  # for anything that a library prints
     _limit()
     question: Question = pickle.load(sys.stdin.buffer)
     try:

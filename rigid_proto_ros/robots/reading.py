@@ -1,6 +1,6 @@
 # SPDX-License-Identifier: MIT
-"""Robots from files, in whichever format: links with inertials and shapes, and where they are. URDF and SDF are read
-here, as these formats define them, MJCF through MuJoCo (robots/mjcf.py).
+"""Robot files of any format: links with inertials and shapes, and their poses. URDF and SDF are read here as these
+formats define them, MJCF through MuJoCo (robots/mjcf.py).
 """
 
 from __future__ import annotations
@@ -27,11 +27,11 @@ from ..mass.tensor import SIX, tensor_from_six
 VISUAL, COLLISION = "visual", "collision"
 NO_INERTIAL = "no <inertial>"
 WATER = 1000.0
-"""kg/m³ of a shape of which nothing else is said."""
+"""Default density of a shape [kg/m³]."""
 MAX_BYTES = 50_000_000
-"""Of a robot's file."""
+"""Largest size of a robot's file [bytes]."""
 LARGEST = 1e50
-"""Of masses, lengths and moments [SI units]: the powers and products that are taken of them don't overflow."""
+"""Largest mass, length or moment [SI units]; its powers and products don't overflow."""
 ZEROS = "0 0 0"
 SIZES = {
     "box": ("size", 3),
@@ -40,7 +40,7 @@ SIZES = {
     "sphere": ("radius", 1),
     "ellipsoid": ("radii", 3),
 }
-"""Names of what says a primitive's size, and how many numbers that is."""
+"""By kind of primitive, the names of its sizes and how many numbers they have."""
 
 
 @dataclass(frozen=True)
@@ -59,9 +59,10 @@ HERE = Pose(np.eye(3), np.zeros(3))
 
 @dataclass(frozen=True)
 class Shape:
-    """A shape as a link shows it or collides with it: kind "mesh" with ``file`` and scale (3,), or with ``size`` [m] a
-    "box" (sides), "cylinder" or "capsule" (radius, length along z, the capsule's without its caps), "sphere" (radius)
-    or "ellipsoid" (semi-axes); pose in the link's frame; ``problem``: why it can't be taken; density [kg/m³]."""
+    """A visual or collision shape of a link. kind: "mesh" with ``file`` and scale (3,), or with ``size`` [m] a "box"
+    (sides), "cylinder" or "capsule" (radius, length along z, the capsule's without its caps), "sphere" (radius) or
+    "ellipsoid" (semi-axes). pose: in the link's frame. problem: why it can't be used. density [kg/m³].
+    """
 
     role: str
     kind: str
@@ -75,11 +76,11 @@ class Shape:
 
 @dataclass(frozen=True)
 class Link:
-    """What a file says of one link: mass [kg], COM (3,) [m] and tensor (3, 3) [kg m²] about it, both in the link's
-    axes; ``problem`` says why when it doesn't. The steps are half a unit of the last digit printed, for mass, COM
-    (3,) and tensor (3, 3): what a number may be off by for its printing alone. ``element``: the <inertial> that was
-    read, None where the file has it from elsewhere; ``owner``: the <link>. ``computed``: a
-    simulator computes the inertial from the collision shapes, for the mass if there is one.
+    """A link as its file describes it: mass [kg], COM (3,) [m] and tensor (3, 3) [kg m²] about it, both in the link's
+    axes. problem: why they are missing. The steps are half a unit of the last printed digit of mass, COM (3,) and
+    tensor (3, 3), which is the error that printing alone may cause. element: the <inertial>; None if the inertial has
+    another source. owner: the <link>. computed: a simulator computes the inertial from the collision shapes, for the
+    mass if one is given.
     """
 
     name: str
@@ -98,10 +99,11 @@ class Link:
 
 @dataclass
 class Robot:
-    """``links``: those with an <inertial> or a shape, in the file's order. ``poses`` gives the pose of each link by
-    name with all joints at 0, in the frame of the root link (URDF), of the model (SDF) or of the world (MJCF), and
-    raises InputError for links that make no tree. ``simulated``: the links with the inertials that the format's own
-    simulator takes, where these aren't the file's."""
+    """links: those with an <inertial> or a shape, in the file's order. poses(): the pose of each link by name with all
+    joints at 0, in the frame of the root link (URDF), of the model (SDF) or of the world (MJCF); raises InputError for
+    links that don't form a tree. simulated(): the links with the inertials that the format's own simulator uses, if
+    these aren't the file's.
+    """
 
     links: list[Link]
     poses: Callable[[], dict[str, Pose]]
@@ -112,9 +114,9 @@ class Robot:
 
 
 def parse_xml(data: bytes, path: Path) -> Element:
-    """The root of a file's XML, names as they are written: SDFs use prefixes (gz:) that they don't declare.
+    """The root of a file's XML, with names as they are written: SDF files use prefixes (gz:) that they don't declare.
 
-    Raises InputError for what is no XML, or has entities.
+    Raises InputError for text that isn't XML, or has entities.
     """
 
     def check_doctype(_name: str, _system: str | None, _public: str | None, has_declarations: bool) -> None:
@@ -127,14 +129,14 @@ def parse_xml(data: bytes, path: Path) -> Element:
     parser.StartElementHandler, parser.EndElementHandler = tree.start, tree.end
     parser.CharacterDataHandler = tree.data
     try:
-        parser.Parse(data.lstrip(), True)  # blank lines before the declaration, which other readers skip
+        parser.Parse(data.lstrip(), True)  # without blank lines before the declaration, as other readers do
         return tree.close()
     except (expat.ExpatError, ValueError, LookupError) as error:
         raise InputError("robot file", path.name, f"well-formed XML ({error})") from None
 
 
 def rotation_from_rpy(roll: float, pitch: float, yaw: float) -> Matrix3:
-    """Rotation (3, 3) of fixed-axes roll, pitch, yaw [rad], as URDF and SDF have them."""
+    """Rotation (3, 3) of roll, pitch and yaw about fixed axes [rad], as in URDF and SDF."""
     cr, sr, cp, sp, cy, sy = (float(f(a)) for a in (roll, pitch, yaw) for f in (np.cos, np.sin))
     return np.array(
         [
@@ -146,15 +148,15 @@ def rotation_from_rpy(roll: float, pitch: float, yaw: float) -> Matrix3:
 
 
 def rotation_from_wxyz(quaternion: Numbers) -> Matrix3:
-    """Rotation (3, 3) of a quaternion (w, x, y, z), MuJoCo's order, of any length but 0."""
+    """Rotation (3, 3) of a quaternion (w, x, y, z), in MuJoCo's order; of any length but 0."""
     w, x, y, z = (np.asarray(quaternion, dtype=float) / np.linalg.norm(np.asarray(quaternion, dtype=float))).tolist()
     return matrix_from_quaternion([x, y, z, w])
 
 
 def floats(name: str, text: str, count: int = 3) -> FloatArray:
-    """``count`` numbers (count,) of a text, which the file calls ``name``; raises InputError for others."""
+    """Parse ``count`` numbers (count,). name: of the text in error messages. Raises InputError for anything else."""
     try:
-        values = np.array([float(word.replace("_", "?")) for word in text.split()])  # Python allows _ in numbers
+        values = np.array([float(word.replace("_", "?")) for word in text.split()])  # Python accepts _ in numbers
     except ValueError:
         values = np.zeros(0)
     if len(values) != count:
@@ -163,7 +165,7 @@ def floats(name: str, text: str, count: int = 3) -> FloatArray:
 
 
 def check_finite(what: str, **numbers: ArrayLike) -> None:
-    """Raise InputError for numbers of something, called by their names, that aren't finite or are beyond LARGEST."""
+    """Raises InputError for named numbers that aren't finite or are beyond LARGEST."""
     for name, values in numbers.items():
         if not np.all(np.abs(values) <= LARGEST):
             received = " ".join(f"{value:g}" for value in np.ravel(values))
@@ -171,17 +173,17 @@ def check_finite(what: str, **numbers: ArrayLike) -> None:
 
 
 def check_inertial(link: Link) -> None:
-    """The same for the numbers of a link's inertial."""
+    """Raises InputError for a link's inertial with numbers that aren't finite or are beyond LARGEST."""
     check_finite(f"link {link.name}", mass=link.mass, center_of_mass=link.center_of_mass, inertia=link.inertia)
 
 
 def number(name: str, text: str) -> float:
-    """A text that is one number, which the file calls ``name``; raises InputError for others."""
+    """Parse one number. name: of the text in error messages. Raises InputError for anything else."""
     return float(floats(name, text, 1)[0])
 
 
 def printed_steps(words: list[str]) -> FloatArray:
-    """Half a unit of the last digit that a group of numbers is printed with: 0.0005 for 0.012 alone; 0 for zeros."""
+    """Half a unit of the last digit that is printed in a group of numbers: 0.0005 for 0.012 alone; 0 for zeros."""
     decimals = []
     for word in words:
         mantissa, _, exponent = word.strip().lower().partition("e")
@@ -193,8 +195,8 @@ def printed_steps(words: list[str]) -> FloatArray:
 def printed_link(
     bare: Link, mass: str, center: str, six: list[str], rotation: Matrix3, element: Element | None
 ) -> Link:
-    """The link with an inertial from a file's words: mass, COM, and the six entries of the tensor in axes turned by
-    ``rotation``.
+    """The link with an inertial parsed from a file's text: mass, COM, and the six entries of the tensor in axes turned
+    by ``rotation``.
     """
     of = f"of link {bare.name}"
     entries = [number(f"{name} {of}", word) for name, word in zip(SIX, six, strict=True)]
@@ -213,13 +215,13 @@ def printed_link(
 
 
 def read_robot(path: Path) -> Robot:
-    """The robot that a file describes; raises InputError when it can't be read."""
+    """Read the robot in a file. Raises InputError if it can't be read."""
     data = read_bounded(path, MAX_BYTES, "robot file", "a URDF, SDF or MJCF file")
     return robot_of(parse_xml(data, path), path)
 
 
 def robot_of(root: Element, path: Path) -> Robot:
-    """The robot below the root of a file; raises InputError for what is none, or holds what are no numbers."""
+    """The robot below the root of a file. Raises InputError for other content, or for text in place of numbers."""
     if path.suffix == ".xacro" or any("xacro" in str(element.tag) for element in root.iter()):
         raise InputError("robot file", path.name, f"plain URDF: xacro {shlex.quote(str(path))} > EXPANDED.urdf")
     if root.tag == "robot":
@@ -236,7 +238,9 @@ def robot_of(root: Element, path: Path) -> Robot:
 
 
 def _sized(shape: Shape, link: str, file: str, scale: str, text: Callable[[str], str | None]) -> Shape:
-    """A link's shape with its mesh's file and scale, or the size of its kind as ``text`` gives it by name."""
+    """A link's shape with the file and scale of its mesh, or with the size of its kind, which ``text`` gives by
+    name.
+    """
     if shape.kind == "mesh":
         problem = shape.problem or ("" if file else "a mesh without a file")
         return replace(shape, file=file, scale=floats(f"scale of a mesh of link {link}", scale), problem=problem)
@@ -248,7 +252,7 @@ def _sized(shape: Shape, link: str, file: str, scale: str, text: Callable[[str],
 
 
 def _drawn(link: Element) -> Iterator[tuple[str, Element, Element]]:
-    """(role, the <visual> or <collision>, what its <geometry> holds) of what a link shows and collides with."""
+    """Role, <visual> or <collision> element, and content of its <geometry>, for each shape of a link."""
     for role in (VISUAL, COLLISION):
         for part in link.findall(role):
             held = next((child for child in part.iterfind("geometry/*") if child.tag != "empty"), None)
@@ -314,7 +318,7 @@ def _urdf_poses(root: Element) -> dict[str, Pose]:
 
 
 def _text(element: Element, tag: str, default: str) -> str:
-    """What an element's child says, the default where it says nothing."""
+    """Text of an element's child, or the default if it is missing or empty."""
     return (element.findtext(tag) or "").strip() or default
 
 
@@ -323,15 +327,13 @@ def _is_true(word: str) -> bool:
 
 
 def _frame_of_pose(element: Element) -> str:
-    """The frame that an element's <pose> is relative to, "" where it names none; up to SDF 1.6 the attribute is
-    ``frame``.
-    """
+    """The frame that an element's <pose> is relative to, or "". Up to SDF 1.6 the attribute is ``frame``."""
     pose = element.find("pose")
     return "" if pose is None else pose.get("relative_to", "") or pose.get("frame", "")
 
 
 def _sdf_pose(element: Element, owner: str) -> Pose:
-    """Of an element's <pose>, relative to whatever that is."""
+    """The pose in an element's <pose>, relative to its frame."""
     pose, what = element.find("pose"), f"pose of {owner}"
     words = {} if pose is None else pose.attrib
     form = words.get("rotation_format", "euler_rpy")
@@ -349,7 +351,7 @@ def _sdf_pose(element: Element, owner: str) -> Pose:
 
 
 def _sdf_links(root: Element) -> list[Link]:
-    """All links; of several models, which may have links of the same name, as ``model::link``."""
+    """All links; those of several models, which may share names, as ``model::link``."""
     models = list(root.iter("model"))
     owner = {link: model.get("name", "?") for model in models for link in model.findall("link") if len(models) > 1}
     links = [(element, _sdf_link(element)) for element in root.iter("link")]
@@ -379,7 +381,7 @@ def _sdf_link(link: Element) -> Link:
     relative = _frame_of_pose(inertial)
     if relative not in ("", name):
         return replace(bare, problem=f"an <inertial> whose pose is relative to {relative!r}")
-    # SDF's own defaults, which simulators take: 1 kg, and 1 kg m² about each axis.
+    # SDF's defaults, which simulators use: 1 kg, and 1 kg m² about each axis.
     six = [_text(inertial, f"inertia/{entry}", "1" if entry in ("ixx", "iyy", "izz") else "0") for entry in SIX]
     rotation = _sdf_pose(inertial, f"the inertial of {owner}").rotation
     center = " ".join(_text(inertial, "pose", ZEROS).split()[:3])
@@ -387,7 +389,7 @@ def _sdf_link(link: Element) -> Link:
 
 
 def _sdf_poses(root: Element) -> dict[str, Pose]:
-    """Poses of the one model's links, joints and frames in its frame."""
+    """Poses of the only model's links, joints and frames in the model's frame."""
     models = list(root.iter("model"))
     if len(models) != 1 or next(root.iter("include"), None) is not None:
         raise InputError("lump", f"{len(models)} models", "an SDF of one model, without <include>")

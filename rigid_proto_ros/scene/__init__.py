@@ -1,2 +1,2 @@
 # SPDX-License-Identifier: MIT
-"""From parameters, scene files and poke scripts to a simulation, and flights without ROS."""
+"""Scenes, scene files and poke scripts; simulations and flights made from them, without ROS."""

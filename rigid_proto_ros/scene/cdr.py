@@ -1,9 +1,9 @@
 # SPDX-License-Identifier: MIT
-"""Messages as bytes: little-endian CDR, as every ROS 2 middleware sends them, packed by ``struct`` alone.
+"""ROS messages as bytes: little-endian CDR, which every ROS 2 middleware sends, packed with ``struct`` alone.
 
-Packing bytes costs a tenth of filling a message object and serializing it. The layout (OMG DDS-XTYPES, plain CDR): a
-header 00 01 00 00; strings as length with their NUL, then the bytes, their length aligned to 4; doubles aligned to 8,
-both from the end of the header.
+Packing bytes takes a tenth of the time of filling a message object and serializing it. Layout (OMG DDS-XTYPES, plain
+CDR): a header 00 01 00 00; a string as its length with the NUL, then its bytes, the length aligned to 4; doubles
+aligned to 8. Alignment counts from the end of the header.
 """
 
 from __future__ import annotations
@@ -19,12 +19,12 @@ _LENGTH = struct.Struct("<I")
 NO_COVARIANCE = (0.0,) * 36
 ODOMETRY_DOUBLES = 7 + 36 + 6 + 36
 ODOMETRY_TWIST = slice(7 + 36, 7 + 36 + 6)
-"""Where an Odometry has its twist among its doubles: pose and twist are each followed by their covariance."""
+"""Indices of the twist among the doubles of an Odometry: pose and twist are each followed by their covariance."""
 
 
 def stamped_doubles(stamp_ns: int, frame_id: str, doubles: Sequence[float], child_frame_id: str | None = None) -> bytes:
-    """A header and doubles: PoseStamped (7: x y z, x y z w), TwistStamped (6), WrenchStamped (6); an Odometry has the
-    name of its child frame between them.
+    """A message of a header and doubles: PoseStamped (7: x y z, x y z w), TwistStamped (6), WrenchStamped (6). An
+    Odometry has the name of its child frame between header and doubles.
     """
     frame = frame_id.encode() + b"\0"
     seconds, nanoseconds = divmod(stamp_ns, 1_000_000_000)
@@ -38,7 +38,9 @@ def stamped_doubles(stamp_ns: int, frame_id: str, doubles: Sequence[float], chil
 
 @functools.lru_cache(maxsize=1024)
 def _stamped_layout(length: int, count: int, child_length: int = 0) -> struct.Struct:
-    """Header, stamp, a string of ``length`` with its NUL, another where it has a length, and ``count`` doubles."""
+    """Layout of header, stamp, a string of ``length`` with its NUL, a second string if its length isn't 0, and
+    ``count`` doubles.
+    """
     strings, end = f"{length}s", 12 + length
     if child_length:
         strings += f"{-end % 4}xI{child_length}s"
@@ -47,7 +49,7 @@ def _stamped_layout(length: int, count: int, child_length: int = 0) -> struct.St
 
 
 def odometry(stamp_ns: int, frames: tuple[str, str], row: Sequence[float]) -> bytes:
-    """A nav_msgs/Odometry, exact: row (13,) is the pose in the first frame, then the twist in the second."""
+    """A nav_msgs/Odometry with zero covariance. row (13,): pose in the first frame, then twist in the second."""
     doubles = (*row[:7], *NO_COVARIANCE, *row[7:], *NO_COVARIANCE)
     return stamped_doubles(stamp_ns, frames[0], doubles, frames[1])
 
@@ -58,7 +60,7 @@ def wrench_stamped(stamp_ns: int, frame_id: str, force: Iterable[float], torque:
 
 
 def read_stamp(data: bytes) -> tuple[int, int]:
-    """Seconds and nanoseconds of a message that begins with a header; raises ValueError for other bytes."""
+    """Seconds and nanoseconds of a message that begins with a header. Raises ValueError for other bytes."""
     if data[:2] == _HEADER[:2] and len(data) >= 16:
         seconds, nanoseconds, _ = _STAMP_AND_LENGTH.unpack_from(data, 4)
         return seconds, nanoseconds
@@ -68,7 +70,7 @@ def read_stamp(data: bytes) -> tuple[int, int]:
 def read_stamped_doubles(
     data: bytes, count: int, has_child_frame: bool = False
 ) -> tuple[int, int, str, tuple[float, ...]]:
-    """Seconds, nanoseconds, frame_id and doubles of a message as ``stamped_doubles`` packs it; raises ValueError for
+    """Seconds, nanoseconds, frame_id and doubles of a message packed by ``stamped_doubles``. Raises ValueError for
     other bytes.
     """
     if data[:2] == _HEADER[:2] and len(data) >= 16:
@@ -91,7 +93,7 @@ def string(text: str) -> bytes:
 
 
 def read_string(data: bytes) -> str:
-    """The text of a std_msgs/String; raises ValueError for other bytes."""
+    """The text of a std_msgs/String. Raises ValueError for other bytes."""
     if data[:2] == _HEADER[:2] and len(data) >= 8:
         (length,) = _LENGTH.unpack_from(data, 4)
         if 0 < length <= len(data) - 8:
@@ -105,13 +107,13 @@ def time(time_ns: int) -> bytes:
 
 
 class Layout:
-    """A message as it grows, field after field. data: its bytes so far, the header among them."""
+    """Builds a message field by field. data: the bytes so far, including the header."""
 
     def __init__(self) -> None:
         self.data = bytearray(_HEADER)
 
     def pack(self, form: str, *values: float) -> int:
-        """Append numbers of one size, as ``struct`` writes them; returns where the first is."""
+        """Append numbers of one size, as ``struct`` packs them. Returns the offset of the first."""
         size = struct.calcsize(f"<{form[-1]}")
         self.data += bytes(-(len(self.data) - len(_HEADER)) % size)
         at = len(self.data)

@@ -1,7 +1,8 @@
 # SPDX-License-Identifier: MIT
-"""Commands (simulation/commands.py) read from messages on their topics and from lines of the event log.
+"""Commands (simulation/commands.py) decoded from messages on topics and from events of the log.
 
-Both are one content: what a message says is what its line keeps. Scripts have words of their own (script.py).
+Both have the same content: the event of a message holds what the message says. Scripts have their own syntax
+(script.py).
 """
 
 from __future__ import annotations
@@ -28,7 +29,7 @@ from . import cdr
 from .script import MESH_FRAME
 
 MARKS = ("reset", "pause", "step", "timeout", "clock", "jump")
-"""Events that no command is behind."""
+"""Kinds of events that are not commands."""
 
 _WRENCH: dict[str, int | slice] = {"force": slice(0, 3), "torque": slice(3, 6)}
 _POINT: dict[str, int | slice] = {"point": slice(0, 3)}
@@ -41,25 +42,26 @@ _MESSAGES = {
     "string/attach": ("string_attach", 3, _POINT),
     "inertia/set": ("inertia", 10, _INERTIA),
 }
-"""By topic below the node's name: the kind of event that a message makes, how many doubles it has, and where they stand
-in the event's content; ixx ixy ixz iyy iyz izz is the tensor."""
+"""By topic below the node's name: the kind of event that a message makes, its number of doubles, and their indices by
+field of the event's content. The tensor is ixx ixy ixz iyy iyz izz.
+"""
 
 EVENT_KINDS = (
     *(kind for kind, *_ in _MESSAGES.values()),
     *("thrusters", "state", "set", "clear_wrench", "string_release"),
 )
-"""Events that a command is behind."""
+"""Kinds of events that are commands."""
 
 Names = tuple[str, str]
 """Names of the world frame and the body frame."""
 
 WORDS: Names = ("world", "body")
-"""Names that every node reads."""
+"""Names that every node accepts."""
 
 
 def frame_names(parameters: Parameters, node_name: str) -> Names:
-    """The names that the node of this name uses for the world frame and the body frame. Raises InputError for one that
-    means something else in a ``frame_id``: commands would act in other axes or at another point than they say.
+    """Names of the world frame and the body frame for a node of this name. Raises InputError for a name that has
+    another meaning in a ``frame_id``: commands would act in other axes or at another point than they say.
     """
     world = parameters.world_frame
     body = parameters.body_frame or node_name.strip("/") or "rigid_body"
@@ -72,9 +74,9 @@ def frame_names(parameters: Parameters, node_name: str) -> Names:
 
 
 def of_message(topic: str, data: bytes, names: Names = WORDS) -> Command:
-    """The command of a message on a topic other than ``schedule``, to a node that calls its frames so.
+    """Decode a message of a topic other than ``schedule``, sent to a node with these frame names.
 
-    Raises ValueError for bytes that are no such message, CommandRefused for what no command says.
+    Raises ValueError for bytes that are no such message, CommandRefused for content that is not a command.
     """
     kind, count, fields = _MESSAGES[topic]
     seconds, nanoseconds, frame_id, numbers = cdr.read_stamped_doubles(data, count)
@@ -85,9 +87,9 @@ def of_message(topic: str, data: bytes, names: Names = WORDS) -> Command:
 
 
 def of_event(kind: str, content: Mapping[str, Any], names: Names = WORDS) -> Command | None:
-    """The command that an event of the log tells of, as the node with these frames read it; None for MARKS.
+    """Decode an event of the log of a node with these frame names. Returns None for MARKS.
 
-    Raises InputError for content that is none of its kind, CommandRefused for what such a node would refuse.
+    Raises InputError for content that doesn't fit the kind, CommandRefused for content that such a node would refuse.
     """
     if kind in MARKS:
         return None
@@ -102,7 +104,9 @@ def of_event(kind: str, content: Mapping[str, Any], names: Names = WORDS) -> Com
 
 
 def _command(kind: str, content: Mapping[str, Any], names: Names) -> Command:
-    """Raises CommandRefused, and what Python raises for content that is none of this kind."""
+    """Make the command of a kind. Raises CommandRefused, and Python's exceptions for content that doesn't fit the
+    kind.
+    """
     match kind:
         case "set":
             return Change(dict(content))

@@ -1,10 +1,10 @@
 # SPDX-License-Identifier: MIT
-"""Lessons: the bundled scenes, each with a title, a question to answer first, steps to try, a sentence each, and why.
-Nothing before the reason gives the answer away.
+"""Lessons: each bundled scene with a title, a question, steps to try in one sentence each, and the reason. Nothing
+shown before the reason gives the answer away.
 
-All of it stands in the comment at the head of the scene's file, in paragraphs: the licence, the title, the question
-with its choices A, B, C and the answer's letter, the steps, the reason, and how to run it. Pages and
-documents take it from there.
+A lesson is written in the comment at the head of its scene file, in paragraphs: the licence, the title, the question
+with its choices A, B, C and the letter of the answer, the steps, the reason, and how to run it. Pages and documents
+read it from there.
 """
 
 from __future__ import annotations
@@ -20,9 +20,9 @@ _QUESTION = re.compile(r"Question: (.+\?) A: (.+) B: (.+) C: (.+) Answer: ([ABC]
 
 @dataclass(frozen=True)
 class Lesson:
-    """name: of the scene. question: what is asked first, with its choices; answer: the number of the right one.
-    sentences: the steps to try. reason: why, in a paragraph. commands: how to run it. script: name of the
-    bundled example that goes with it, or empty. duration_s: of the first command.
+    """name: name of the scene. question: asked first, with its choices. answer: index of the right choice. sentences:
+    the steps to try. reason: the explanation, one paragraph. commands: how to run it. script: name of the bundled
+    script that belongs to it, or empty. duration_s: duration of the first command [s].
     """
 
     name: str
@@ -39,12 +39,12 @@ class Lesson:
 
 
 def lessons() -> list[Lesson]:
-    """All bundled lessons, by name."""
+    """All bundled lessons, sorted by name."""
     return [lesson(name) for name in scene_names()]
 
 
 def lesson(name: str) -> Lesson:
-    """The lesson of a bundled scene; raises InputError for a name that is none."""
+    """The lesson of a bundled scene. Raises InputError for an unknown name."""
     path = scene_path(name)
     head: list[str] = []
     for line in path.read_text("utf-8").splitlines():

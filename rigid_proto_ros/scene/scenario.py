@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: MIT
-"""From parameters to a body in motion: the one place where a scene becomes the core's Setup.
+"""Scenario: checked parameters with the Setup that the simulation runs.
 
-The node, the offline run and replay all come through here, so that one scene means one motion.
+The node, the offline run and replay all make their Setup here, so that a scene gives the same motion in each.
 """
 
 from __future__ import annotations
@@ -48,8 +48,8 @@ _HASH = re.compile(r"^# mesh_sha256: ([0-9a-f]{64})$", re.MULTILINE)
 
 @dataclass(eq=False)
 class BodyMesh:
-    """A mesh with what is computed from it once: its moments, its surface wound outward, and its numbers (MESH), of
-    which there are those that a scene has needed so far. volume: of a body of parts, the sum of theirs.
+    """A mesh with what is computed from it once: its moments, its surface wound outward, and its numbers (MESH), filled
+    for the inertia models that scenes have used so far. volume: for a body of parts, the sum of the parts' volumes.
     """
 
     mesh: Mesh
@@ -59,9 +59,9 @@ class BodyMesh:
     volume: float | None = None
 
     def provide(self, model: str, scale: Vector3) -> np.record:
-        """The numbers with the moments of a model at this scale (3,); raises MeshError."""
+        """The numbers, with the moments of a model at this scale (3,) added. Raises MeshError."""
         numbers = new_record(MESH)
-        copy_fields(self.numbers, numbers)  # setups keep the present ones
+        copy_fields(self.numbers, numbers)  # a copy: setups keep the present record
         number = INERTIA_MODELS.index(model)
         if model == "walled":
             copy_fields(self.moments.walls(scale), numbers["walls"])
@@ -76,9 +76,9 @@ class BodyMesh:
 
 @dataclass(frozen=True)
 class Scenario:
-    """Checked parameters and what follows from them; immutable.
+    """Checked parameters and what is derived from them; immutable.
 
-    body_mesh: None without a mesh. warnings: one line each. ghost: the setup of the ghost, when one is asked for.
+    body_mesh: None without a mesh. warnings: one line each. ghost: setup of the ghost, if there is one.
     """
 
     parameters: Parameters
@@ -88,16 +88,17 @@ class Scenario:
     ghost: Setup | None = None
 
     def __reduce__(self) -> tuple[Callable[..., Scenario], tuple[Parameters, Mesh | None]]:
-        """For another process it is made anew: compiled functions and their addresses are this one's."""
+        """Pickle parameters and mesh only: compiled functions and their addresses are valid in this process only."""
         return _of_parameters, (self.parameters, self.body_mesh.mesh if self.body_mesh else None)
 
     def with_changes(
         self, changes: Mapping[str, object], mesh: Mesh | None = None, at_hand: Scenario | None = None
     ) -> Scenario:
-        """The scenario with these parameters changed, checked together; raises InputError and leaves this one as it is.
+        """A scenario with these parameters changed and all checked together. Raises InputError; this scenario never
+        changes.
 
-        mesh: a mesh at hand, used instead of loading the one that the parameter names. at_hand: a scenario whose mesh
-        is used where it is the one that the parameters ask for.
+        mesh: a loaded mesh, used instead of the one that the parameter names. at_hand: a scenario whose mesh is reused
+        if the parameters name the same mesh.
         """
         values = with_mass_of_density(check_values(changes))
         parameters = self.parameters.with_values(values)
@@ -113,8 +114,8 @@ class Scenario:
 
 
 def check_values(changes: Mapping[str, object]) -> dict[str, Value]:
-    """The values in their parameters' own types. Raises InputError for what is no change of any scenario in flight: an
-    unknown name, a value of another type or outside its bounds, a parameter that is set at start only.
+    """Convert values to their parameters' types. Raises InputError for a change that no running scenario can take: an
+    unknown name, a value of another type or out of bounds, a parameter that can be set at start only.
     """
     values = convert_all(changes)
     for name, value in values.items():
@@ -126,21 +127,22 @@ def check_values(changes: Mapping[str, object]) -> dict[str, Value]:
 
 
 def scene_text(values: Mapping[str, Value], mesh_sha256: str = "") -> str:
-    """Parameters by name as a parameter file for a node of any name, the hash of the mesh's file in a comment."""
+    """Parameters by name as a parameter file for a node of any name, with the hash of the mesh file in a comment."""
     lines = [f"    {name}: {yaml_value(value)}" for name, value in sorted(values.items())]
     mesh = [f"# mesh_sha256: {mesh_sha256}"] if mesh_sha256 else []
     return "\n".join([*mesh, "/**:", "  ros__parameters:", *lines, ""])
 
 
 def mesh_sha256_of(scene: str) -> str:
-    """The hash of the mesh's file that ``scene_text`` put into a comment, or ""."""
+    """The hash of the mesh file from the comment that ``scene_text`` writes, or ""."""
     found = _HASH.search(scene)
     return found.group(1) if found else ""
 
 
 def mesh_file(scene: str, at_hand: Iterable[tuple[str, bytes]] = ()) -> tuple[str, bytes] | None:
-    """Name and bytes of the mesh's file of a scene, for a recording, from where the scene says or from those at hand.
-    None where it has changed or gone since it was loaded, or is one of several files.
+    """Name and bytes of a scene's mesh file, to be put into a recording. It is read from the scene's path or taken from
+    ``at_hand``. None if the file has changed or is missing since it was loaded, or if the mesh consists of several
+    files.
     """
     files = [*at_hand]
     with suppress(InputError, OSError):
@@ -151,9 +153,9 @@ def mesh_file(scene: str, at_hand: Iterable[tuple[str, bytes]] = ()) -> tuple[st
 
 
 def make_scenario(values: Mapping[str, object], mesh: Mesh | None = None) -> Scenario:
-    """A scenario from some parameters by name, the others at their defaults; raises InputError or one of its family.
+    """A scenario of parameters by name, the others at their defaults. Raises InputError or a subclass.
 
-    mesh: a mesh at hand, used instead of loading the one that the parameter names.
+    mesh: a loaded mesh, used instead of the one that the parameter names.
     """
     return _of_parameters(Parameters().replaced(values), mesh)
 
@@ -165,16 +167,18 @@ def _of_parameters(parameters: Parameters, mesh: Mesh | None) -> Scenario:
 def read_scene(
     name: str, settings: Mapping[str, object] | None = None, warn: Callable[[str], None] = print
 ) -> Scenario:
-    """The scenario of a scene file, or of a mesh alone, by path or bundled name, with ``settings`` on top.
+    """The scenario of a scene file or of a mesh, by path or bundled name, with ``settings`` on top.
 
-    An unknown name in a section for this node raises InputError; in ``/**`` it is warned of. A density among the
-    settings sets the scene's mass, which would win, to 0, as it does in flight.
+    An unknown name raises InputError in a section for this node, and gives a warning in ``/**``. A density in the
+    settings sets the scene's mass to 0, as it does in flight, because a mass would take precedence.
     """
     return make_scenario({**named_values(name, warn), **with_mass_of_density(settings or {})})
 
 
 def load_body_mesh(parameters: Parameters, mesh: Mesh | None = None) -> BodyMesh | None:
-    """The mesh that the parameters name (or the one at hand), with its moments; None without one. Raises MeshError."""
+    """Load the mesh that the parameters name, or take the one given, and compute its moments. None without a mesh.
+    Raises MeshError.
+    """
     if parameters.mesh == "":
         return None
     body = mesh_body(mesh or parameters.mesh, repair=parameters.mesh_repair, fallback=parameters.mesh_fallback)
@@ -187,15 +191,15 @@ def load_body_mesh(parameters: Parameters, mesh: Mesh | None = None) -> BodyMesh
 
 
 def _made_of(parameters: Parameters) -> tuple[str, bool, str]:
-    """What of the parameters a mesh is loaded for."""
+    """The parameters that determine which mesh is loaded."""
     return parameters.mesh, parameters.mesh_repair, parameters.mesh_fallback
 
 
 def build_scenario(
     parameters: Parameters, body_mesh: BodyMesh | None, like: tuple[Setup, Collection[str]] | None = None
 ) -> Scenario:
-    """The scenario of parameters whose mesh is loaded already; raises InputError. like: a setup, and the names of the
-    parameters that may differ from its own.
+    """The scenario of parameters whose mesh is already loaded. Raises InputError. like: a setup, and the names of the
+    parameters that may differ from it.
     """
     setup = _setup(parameters, body_mesh, like)
     return Scenario(parameters, body_mesh, setup, setup.warnings, _ghost_setup(parameters, body_mesh))
@@ -217,14 +221,14 @@ def _ghost_setup(parameters: Parameters, body_mesh: BodyMesh | None) -> Setup | 
 
 
 _SCENE_VALUES = {name: (field_of(name), PARAMETERS[name].choices, attrgetter(name)) for name in SCENE_PARAMETERS}
-"""Of parameters that are numbers of a scene: the field of its record, the choices of which it is a number, and where
-the value stands.
+"""By parameter that is a number of a scene: the field of the record, the choices that the number is an index of, and
+the getter of its value.
 """
 
 
 def scene_record(parameters: Parameters, like: tuple[Setup, Collection[str]] | None = None) -> np.record:
-    """The numbers of parameters (simulation/record.py, SCENE); raises InputError for more ballast than it holds. like:
-    as for ``build_scenario``.
+    """The numbers of parameters (simulation/record.py, SCENE). Raises InputError for more ballast than the record
+    holds. like: as in ``build_scenario``.
     """
     scene: np.record = new_record(SCENE) if like is None else copy_of(like[0].scene)
     names = PARAMETERS if like is None else like[1]
@@ -269,7 +273,7 @@ def _setup(
             mesh_name=body_mesh.mesh.name if body_mesh else "",
         )
     except InputError as error:
-        if error.field == "scale":  # as it was given, by one number or three
+        if error.field == "scale":  # reported as it was given: one number or three
             raise InputError("scale", list(parameters.scale), error.accepted) from None
         raise
     if parameters.imu_contact and parameters.imu_contact not in parameters.contacts:
@@ -279,10 +283,10 @@ def _setup(
 
 
 def with_inertia(scenario: Scenario, content: Mapping[str, Any]) -> Scenario:
-    """The scenario with the explicit inertia of an event's content; raises CommandRefused (``nonfinite``, ``tensor``).
+    """The scenario with the explicit inertia of an event's content. Raises CommandRefused (``nonfinite``, ``tensor``).
 
-    com (3,): scaled mesh coordinates, or metres from the present COM when ``relative``. It stands for the whole body,
-    so every ballast mass becomes 0.
+    com (3,): scaled mesh coordinates, or metres from the present COM if ``relative``. The explicit inertia is that of
+    the whole body, so every ballast mass becomes 0.
     """
     numbers = [content["mass"], *content["com"], *content["tensor"]]
     if not np.isfinite(numbers).all():

@@ -1,10 +1,10 @@
 # SPDX-License-Identifier: MIT
-"""A scenario in motion: its simulation and its ghost, what observers are told of both, and the one place where a change
-of parameters reaches both. Without ROS and a clock: ``OfflineRun``, as fast as the machine goes.
+"""A running scenario: its simulation, its ghost, their observer, and changes of parameters, which reach both.
+``OfflineRun`` runs it as fast as possible, without ROS and without a clock.
 
-The ghost is a second body that gets the same commands under another tensor or integrator, to be seen beside the first:
-true against box, exact against rk4, where the two part is the lesson. It never acts back, and a run without a viewer
-has none.
+The ghost is a second body that gets the same commands under another inertia model or integrator and is drawn beside the
+first: true against box, exact against rk4. It shows where the two motions part. It never acts on the first body, and a
+run without a viewer has no ghost.
 """
 
 from __future__ import annotations
@@ -37,8 +37,8 @@ from .script import at_contact
 
 
 class Ghost(Observer):
-    """The simulation of ``Scenario.ghost``; follows another one's commands. The observer is told
-    of what the ghost doesn't support, once until the next reset; ``refusal`` keeps it.
+    """The simulation of ``Scenario.ghost``, which gets the commands of another simulation. The observer is notified of
+    the first command that the ghost doesn't support, once until the next reset; ``refusal`` keeps the message.
     """
 
     takes = frozenset({Refused})
@@ -50,28 +50,28 @@ class Ghost(Observer):
         self._shown = True
 
     def on(self, event: Event) -> None:
-        """A command was refused when it came to act."""
+        """Report a command that was refused when it was due."""
         if isinstance(event, Refused):
             self._goes_without(event.message)
 
     def announce(self) -> None:
-        """Tell the observer what the ghost is."""
+        """Notify the observer of the ghost's setup."""
         setup = self.simulation.setup if self._shown else None
         self._observer.on(GhostChanged(self.simulation.time_ns, setup))
 
     def watch(self, observer: Observer) -> None:
-        """Tell another observer from now on."""
+        """Replace the observer and notify it of the ghost's setup."""
         self._observer = observer
         self.announce()
 
     def submit(self, command: Command, when_ns: int, listed: Listed | None = None) -> None:
-        """Take a command of the followed simulation; what the ghost doesn't support it goes without, and the observer
-        is told.
+        """Submit a command of the followed simulation. A command that the ghost doesn't support is skipped and
+        reported.
         """
         if isinstance(command, Change):
-            return  # ``change`` brings its own setup
+            return  # ``change`` submits the ghost's own setup
         try:
-            # A change before it in its list may allow what the present setup doesn't.
+            # Unchecked within a list: an earlier change of the list may permit what the present setup refuses.
             self.simulation.submit(command, when_ns, listed, check=listed is None)
         except InputError as error:
             self._goes_without(str(error))
@@ -82,8 +82,8 @@ class Ghost(Observer):
             self._observer.on(Refused(self.simulation.time_ns, "ghost", self.refusal))
 
     def change(self, time_ns: int, scenario: Scenario, listed: Listed | None = None) -> None:
-        """The followed scenario changed at ``time_ns``, at this place in a list; one without a ghost leaves this one
-        out of sight.
+        """Follow a change of the scenario at ``time_ns``, at this place in a list. A scenario without a ghost hides
+        this one.
         """
         setup = scenario.ghost
         self._shown = setup is not None
@@ -92,19 +92,19 @@ class Ghost(Observer):
         self._observer.on(GhostChanged(time_ns, setup))
 
     def act(self, now_ns: int) -> None:
-        """Let the commands that are due now act."""
+        """Apply the commands that are due now."""
         self.simulation.advance(now_ns)
         self.simulation.act()
 
     def advance(self, until_ns: int) -> None:
-        """Advance the ghost and tell the observer where it is."""
+        """Advance the ghost and notify the observer of its state."""
         state = self.simulation.advance(until_ns)
         if self._shown and not self.simulation.failure:
             self._observer.on(GhostPublished(until_ns, state.row))
 
 
 class Publications:
-    """The times of publications at ``rate`` a simulated second; ``next_ns`` is the next one's."""
+    """The times of publications at ``rate`` per simulated second; ``next_ns`` is the next one."""
 
     def __init__(self, rate: float) -> None:
         self.rate = rate
@@ -116,32 +116,32 @@ class Publications:
         return publication_ns(self._number, self.rate)
 
     def restart(self) -> None:
-        """The next one is that of time 0."""
+        """Start again at time 0."""
         self._number = 0
 
     def find_after(self, now_ns: int) -> None:
-        """The next one is the first after ``now_ns``."""
+        """Make the next publication the first after ``now_ns``."""
         self._number = 0
         self.pass_over(now_ns)
 
     def pass_over(self, present_ns: int) -> None:
-        """Make none up to the present; one that is next already stays so."""
+        """Skip publications up to the present; a later next one stays."""
         numerator, denominator = self.rate.as_integer_ratio()
-        # One early, and then on: the estimate is floored and publications are rounded.
+        # Start one early, then count up: the estimate is floored, and publications are rounded.
         self._number = max(self._number, present_ns * numerator // (1_000_000_000 * denominator) - 1)
         while self.next_ns <= present_ns:
             self._number += 1
 
 
 def after_change(scenario: Scenario, change: Change, at_hand: Scenario | None = None) -> Scenario:
-    """The scenario that a change makes of this one; raises InputError. at_hand: as in ``Scenario.with_changes``."""
+    """The scenario that a change makes of this one. Raises InputError. at_hand: as in ``Scenario.with_changes``."""
     if change.kind == "inertia":
         return with_inertia(scenario, change.content)
     return scenario.with_changes(change.content, at_hand=at_hand)
 
 
 class ScenarioRun:
-    """scenario: the one in force. ghost: None until ``begin_ghost``, and where the scenario asks for none."""
+    """scenario: the present one. ghost: None before ``begin_ghost``, and if the scenario has none."""
 
     def __init__(self, scenario: Scenario, observer: Observer | None = None) -> None:
         self.scenario = scenario
@@ -156,14 +156,14 @@ class ScenarioRun:
         self.simulation.announce()
 
     def begin_ghost(self) -> None:
-        """Begin the ghost that the scenario asks for, if any; it gets all commands that are submitted from now on."""
+        """Start the scenario's ghost, if it has one. It gets all commands that are submitted from now on."""
         self.ghost = None
         if self.scenario.ghost is not None:
             self.ghost = Ghost(self.scenario.ghost, self.observer)
             self.ghost.announce()
 
     def publish(self, time_ns: int, row: StateRow) -> None:
-        """Tell the observer a state, and where the ghost is then."""
+        """Notify the observer of a state, and of the ghost's state at that time."""
         self.observer.on(Published(time_ns, row))
         self.simulation.notify_floor()
         if self.ghost is not None:
@@ -176,8 +176,8 @@ class ScenarioRun:
         listed: Listed | None = None,
         at_hand: Scenario | None = None,
     ) -> int:
-        """Submit a command to the simulation (see ``Simulation.submit``) and to the ghost; a change acts on the
-        parameters in force then (``setup_of``). at_hand: a scenario whose mesh may be that of the change.
+        """Submit a command to the simulation (see ``Simulation.submit``) and to the ghost. A change applies to the
+        parameters at the time when it acts (``setup_of``). at_hand: a scenario whose mesh the change may reuse.
         """
         if isinstance(command, Change):
             command = replace(command, apply=partial(self.setup_of, command, at_hand))
@@ -187,9 +187,10 @@ class ScenarioRun:
         return when_ns
 
     def check(self, commands: Iterable[Command], anew: bool = False) -> Iterator[tuple[Command, Scenario]]:
-        """Commands in order of time, contacts by their points, each with the scenario that it acts in: the one that the
-        changes up to it, among them, make of the present one. Raises InputError for one that this scenario can't take,
-        unless a change that waits already may permit it, which a reset (``anew``) drops.
+        """Yields the commands in order of time, with contacts replaced by their points, each with the scenario in which
+        it acts: the present one after all changes up to and including the command. Raises InputError for a command that
+        this scenario can't take, unless a change that is already pending may permit it. A reset (``anew``) drops
+        pending changes.
         """
         scenario = self.scenario
         for command in commands:
@@ -208,30 +209,30 @@ class ScenarioRun:
             yield command, scenario
 
     def check_change(self, scenario: Scenario) -> None:
-        """Raises InputError where this scenario can't follow the present one."""
+        """Raises InputError if this scenario can't follow the present one."""
         self.simulation.check_change(scenario.setup)
 
     def setup_of(self, command: Change, at_hand: Scenario | None = None) -> Setup:
-        """Put in force what a change says that acts now; returns the setup. Raises InputError, and then all stays as it
-        was. at_hand: a scenario whose mesh may be its.
+        """Apply a change that acts now and return the new setup. Raises InputError and then changes nothing. at_hand: a
+        scenario whose mesh the change may reuse.
         """
         return self.replace(after_change(self.scenario, command, at_hand))
 
     def replace(self, scenario: Scenario) -> Setup:
-        """Put another scenario in force, its publication rate too; the ghost follows, and the observer is notified."""
+        """Replace the scenario and its publication rate. The ghost follows, and the observer is notified."""
         self.check_change(scenario)
         self.scenario = scenario
         if scenario.parameters.publish_rate != self.publications.rate:
             self.publications.rate = scenario.parameters.publish_rate
             self.publications.find_after(self.simulation.time_ns)
-        # One that isn't there would have missed what was commanded so far: it begins at the next reset.
+        # A new ghost would have missed all commands so far, so it starts at the next reset.
         if self.ghost is not None:
             self.ghost.change(self.simulation.time_ns, scenario, self.simulation.listed)
         self.notify_scene()
         return scenario.setup
 
     def notify_scene(self) -> None:
-        """Tell the observer the parameters in force."""
+        """Notify the observer of the present parameters."""
         self.observer.on(SceneChanged(self.simulation.time_ns, self.scenario.text))
 
 
@@ -245,28 +246,27 @@ def notify_start(observer: Observer, scenario: Scenario) -> None:
 
 
 class OfflineRun(ScenarioRun):
-    """A simulation with its script submitted, as fast as the machine goes; ``advance`` takes it from publication to
-    publication. submitted: how many commands since time 0.
+    """A simulation with its script submitted, run as fast as possible. ``advance`` runs it from publication to
+    publication. submitted: number of commands since time 0.
     """
 
     def __init__(self, scenario: Scenario, script: Iterable[Command] = (), observer: Observer | None = None) -> None:
         super().__init__(scenario, observer)
         self._is_observed = observer is not None
         self.submitted = 0
-        self._rates_ns: list[int] = []  # when the publication rate changes, a heap
+        self._rates_ns: list[int] = []  # times at which the publication rate changes; a heap
         if observer is not None:
             self.announce()
             self.begin_ghost()
         self.submit(script)
 
     def submit(self, script: Iterable[Command]) -> None:
-        """Take the commands of a script, which act behind those taken before where their times are equal; each is
-        checked in the scene that those before it in the script have made by then. Takes all, or none and raises
-        InputError.
+        """Submit the commands of a script. At equal times they act after those submitted before. Each is checked in the
+        scene that the earlier commands of the script give. Takes all commands, or none and raises InputError.
         """
         commands = list(script)
         if len(commands) == 1 and isinstance(command := commands[0], WrenchCommand):
-            # Taken or refused as a whole already.
+            # A single command is taken or refused as a whole anyway.
             try:
                 self.take(command, command.stamp_ns, (0, self.submitted + 1))
             except InputError as error:
@@ -280,7 +280,7 @@ class OfflineRun(ScenarioRun):
                 heappush(self._rates_ns, when_ns)
 
     def restart(self, scenario: Scenario | None = None) -> None:
-        """Begin again at time 0, with another scenario if one is given; what waits is dropped."""
+        """Start again at time 0, with another scenario if one is given. Pending commands are dropped."""
         if scenario is not None and scenario is not self.scenario:
             self.scenario = scenario
             self.publications = Publications(scenario.parameters.publish_rate)
@@ -293,7 +293,7 @@ class OfflineRun(ScenarioRun):
             self.begin_ghost()
 
     def fly(self, scenario: Scenario, script: Sequence[Command], until_ns: int) -> bool:
-        """``restart`` with this scenario, ``submit`` and ``advance`` in one; raises InputError."""
+        """``restart`` with this scenario, ``submit`` and ``advance`` in one call. Raises InputError."""
         if not self._is_observed and self.simulation.fly(scenario.setup, script, until_ns):
             self.scenario, self.submitted = scenario, len(script)
             self._rates_ns.clear()
@@ -312,14 +312,16 @@ class OfflineRun(ScenarioRun):
         return taken
 
     def _misplaced(self, command: Command, error: InputError, taken: int = 0) -> InputError:
-        """The error of a command behind so many others of its script."""
+        """The error of a command, with its place in the script. taken: number of commands of the script before it."""
         place = f"script, command {self.submitted + taken + 1} at {command.stamp_ns / 1e9:g} s, {error.field}"
         return InputError(place, error.received, error.accepted)
 
     def advance(self, until_ns: int) -> bool:
-        """Advance the body to ``until_ns``, notifying the observer every publication; False when the motion failed."""
+        """Advance the body to ``until_ns`` and notify the observer at every publication. Returns False if the motion
+        failed.
+        """
         while self._rates_ns and self._rates_ns[0] < until_ns:
-            # The new rate counts from there, however far the next publication of the old one was.
+            # Publications at the new rate are counted from the change, whatever the next one at the old rate was.
             if not self._advance_evenly(heappop(self._rates_ns) + 1):
                 return False
         return self._advance_evenly(until_ns)
@@ -336,13 +338,13 @@ class OfflineRun(ScenarioRun):
         return not simulation.failure
 
     def end(self) -> None:
-        """Tell the observer what has held the flight to less than its accuracy."""
+        """Notify the observer of what has limited the accuracy of the flight."""
         if self._is_observed:
             self.simulation.notify_floor(at_end=True)
 
 
 def run_with_progress(run: OfflineRun, duration_ns: int) -> float:
-    """Advance by a hundredth of the duration at a time, and show how far it is; returns the wall time [s]."""
+    """Advance in steps of a hundredth of the duration and show progress. Returns the wall time [s]."""
     start = time.perf_counter()
     with Progress(f"simulating {duration_ns / 1e9:g} s") as progress:
         for part in range(1, 101):
@@ -354,7 +356,7 @@ def run_with_progress(run: OfflineRun, duration_ns: int) -> float:
 
 
 def summary(run: OfflineRun, wall_time: float) -> dict[str, Any]:
-    """What ``simulate --json`` prints: the final state, energies and what the run cost."""
+    """The output of ``simulate --json``: the final state, energies and costs of the run."""
     simulation = run.simulation
     state = simulation.state
     return {

@@ -1,9 +1,9 @@
 # SPDX-License-Identifier: MIT
 """Scene files: ROS parameter files, read without ROS and typed as rcl types them.
 
-A scene is the same file that starts the node with ``--params-file``. Plain scalars are a bool, an integer (also 0x10
-and 010), a double (also 1e-3, .inf, nan) or else text; quoted ones are text; a list must hold one type, as rcl wants
-it.
+A scene is the file that starts the node with ``--params-file``. A plain scalar is a bool, an integer (also 0x10 and
+010), a double (also 1e-3, .inf, nan) or otherwise text. A quoted scalar is text. All items of a list have one type, as
+in rcl.
 """
 
 from __future__ import annotations
@@ -32,11 +32,11 @@ GONE = re.compile(
 """Parameters of earlier versions."""
 
 GONE_DEFAULTS = {"step_periods": 1, "frames": "own"}
-"""Of those among them whose default isn't empty or 0."""
+"""Their defaults, if not empty or 0."""
 
 
 def scene_file(name: str) -> Path:
-    """The file of a scene given by path or bundled name; raises InputError naming the bundled ones."""
+    """Path of a scene given by path or bundled name. Raises InputError, which lists the bundled scenes."""
     path = Path(name)
     if not path.is_file() and "/" not in name and name.removesuffix(".yaml") in scene_names():
         return scene_path(name.removesuffix(".yaml"))
@@ -50,12 +50,12 @@ def scene_file(name: str) -> Path:
 
 
 def is_mesh(name: str) -> bool:
-    """Whether a name that stands for a scene is a mesh's: of a file in a format that is read, or of parts, by path or
-    package:// URI, or of a bundled body that has no scene of its name.
+    """Whether a scene's name is that of a mesh: a file in a supported format or of parts, by path or package:// URI, or
+    a bundled body that has no scene of the same name.
     """
     suffix = Path(name).suffix.lower().lstrip(".")
     if suffix in YAML and Path(name).is_file():
-        with suppress(InputError):  # which the scene's reader tells
+        with suppress(InputError):  # reported by the reader of scenes
             return tells_parts(read_text(Path(name), "a YAML file"))
     if suffix in YAML or not (name.startswith("package://") or Path(name).is_file()):
         return name in body_names() and name not in scene_names()
@@ -63,14 +63,14 @@ def is_mesh(name: str) -> bool:
 
 
 def named_values(name: str, warn: Callable[[str], None] = print) -> dict[str, object]:
-    """The parameters of a scene, or of a body alone, by path or bundled name; as ``scene_values`` has it."""
+    """The parameters of a scene, or of a body alone, by path or bundled name. Unknown names as in ``scene_values``."""
     return {"mesh": name} if is_mesh(name) else scene_values(scene_file(name), warn)
 
 
 @dataclass
 class SceneFile:
-    """values: parameters by name for the node; wildcard: names that only ``/**`` sections gave. has_section: whether
-    any section is for the node; unused: the sections that aren't.
+    """values: the node's parameters by name. wildcard: names that only ``/**`` sections have. has_section: whether any
+    section is for the node. unused: the sections that are not.
     """
 
     values: dict[str, object] = field(default_factory=dict)
@@ -80,14 +80,14 @@ class SceneFile:
 
 
 def read_scene_file(path: str | Path, node_name: str = "rigid_body") -> SceneFile:
-    """Read the sections for this node, given with its namespace, later ones winning; raises InputError naming file,
-    line and remedy.
+    """Read the sections for this node, whose name includes its namespace; later sections override earlier ones. Raises
+    InputError, which names file, line and remedy.
     """
     return read_scene_text(read_text(Path(path), "a YAML file"), str(path), node_name)
 
 
 def read_scene_text(text: str, name: str = "scene", node_name: str = "rigid_body") -> SceneFile:
-    """Like ``read_scene_file``, but from text; ``name`` is used in error messages."""
+    """Read a scene from text, as ``read_scene_file`` does. name: for error messages."""
     scene = SceneFile()
     root = compose_yaml(text, name)
     if root is None:
@@ -111,7 +111,7 @@ def read_scene_text(text: str, name: str = "scene", node_name: str = "rigid_body
             named |= values.keys()
     for parameter in [parameter for parameter in scene.values if GONE.match(parameter)]:
         value = scene.values.pop(parameter)
-        # A recorded scene holds all parameters of its version: what had no effect is left out.
+        # A recorded scene holds all parameters of its version, so those without effect are skipped.
         if any(value) if isinstance(value, list) else value not in (0, "", GONE_DEFAULTS.get(parameter)):
             raise InputError(f"{name}, {parameter}", "a parameter of an earlier version that no longer exists")
     scene.wildcard = scene.values.keys() - named
@@ -121,8 +121,8 @@ def read_scene_text(text: str, name: str = "scene", node_name: str = "rigid_body
 def scene_values(
     path: str | Path, warn: Callable[[str], None] = print, node_name: str = "rigid_body"
 ) -> dict[str, object]:
-    """The parameters that a scene file gives a node; unknown names as ``read_scene`` has it. A relative mesh that isn't
-    found from the current folder is looked for beside the file.
+    """The parameters that a scene file gives to a node; unknown names as in ``read_scene``. A relative path of a mesh
+    is searched from the current folder, then from the scene's folder.
     """
     scene = read_scene_file(path, node_name)
     if not scene.has_section:
@@ -147,8 +147,8 @@ def scene_values(
 
 
 def check_record(names: object) -> None:
-    """A scene, which a stranger may have written, records only below the working folder. Raises InputError for what its
-    parameter ``record`` names elsewhere.
+    """Check that a scene records only below the working folder, since a stranger may have written it. Raises InputError
+    for any other path in its parameter ``record``.
     """
     for name in str(names or "").split(","):
         if not Path(name.strip()).resolve().is_relative_to(Path.cwd()):
@@ -157,7 +157,7 @@ def check_record(names: object) -> None:
 
 
 def mesh_found_from(mesh: str, folder: Path) -> str:
-    """The mesh by the name that a scene file in ``folder`` gives it, or beside that file if it's only there."""
+    """The name by which a mesh is found: as the scene file in ``folder`` gives it, or else relative to that folder."""
     for name in (mesh, str(folder / mesh)):
         with suppress(MeshError):
             resolve_mesh(name)
@@ -166,7 +166,7 @@ def mesh_found_from(mesh: str, folder: Path) -> str:
 
 
 def _sections(path: str, tree: yaml.Node, namespace: str) -> Iterator[tuple[str, yaml.Node]]:
-    """The nodes' names, with the namespaces that they are nested in, and what stands under their ros__parameters."""
+    """Pairs of a node's name, with the namespaces around it, and the content of its ros__parameters."""
     if not isinstance(tree, yaml.MappingNode):
         raise refused(tree, path, "a mapping such as rigid_body: {ros__parameters: {...}}")
     for key, content in tree.value:
@@ -180,15 +180,15 @@ def _sections(path: str, tree: yaml.Node, namespace: str) -> Iterator[tuple[str,
 
 
 def _section_form(name: str) -> re.Pattern[str]:
-    """Which full names of nodes a section is for: ``*`` stands for one part of a name, ``**`` for any
-    number of them.
+    """Pattern of the full node names that a section is for: ``*`` stands for one part of a name, ``**`` for any number
+    of parts.
     """
     parts = {"*": "/[^/]+", "**": "(/[^/]+)*"}
     return re.compile("".join(parts.get(part, f"/{re.escape(part)}") for part in name.split("/")[1:]) + r"\Z")
 
 
 def typed_value(text: str, name: str) -> object:
-    """A value as rcl types it on a command line; raises InputError for what rcl refuses."""
+    """A value, typed as rcl types it on a command line. Raises InputError for what rcl refuses."""
     node = compose_yaml(text, name)
     if isinstance(node, yaml.SequenceNode):
         return _sequence(name, node)
@@ -198,7 +198,7 @@ def typed_value(text: str, name: str) -> object:
 
 
 def _values(path: str, node: yaml.Node, prefix: str) -> Iterator[tuple[str, int, object]]:
-    """The parameters that stand in a mapping, those of an inner one below its name: name, line and value."""
+    """Name, line and value of each parameter in a mapping; the names of an inner mapping are prefixed with its own."""
     if not isinstance(node, yaml.MappingNode):
         raise refused(node, path, "name: value lines under ros__parameters")
     for key, value in node.value:
@@ -218,7 +218,7 @@ def _sequence(path: str, node: yaml.SequenceNode) -> list[object]:
     for item in node.value:
         if isinstance(item, yaml.MappingNode):
             raise refused(item, path, "a list of plain values")
-        # rcl reads nested lists as one long list.
+        # rcl flattens nested lists.
         items.extend(_sequence(path, item) if isinstance(item, yaml.SequenceNode) else [typed(item)])
     if len({type(item) for item in items}) > 1:
         raise refused(node, path, "a list of one type: write whole numbers with a point too, as in [0.0, 0.0, -9.81]")

@@ -1,7 +1,8 @@
 # SPDX-License-Identifier: MIT
-"""Poke scripts: a YAML list of timed entries, read as commands, and commands written as entries again.
+"""Poke scripts: YAML lists of timed entries, read as commands; and commands written as entries.
 
-``poke_client`` sends a script's commands and ``simulate`` applies them, from one reading, so that both give one motion.
+``poke_client`` sends a script's commands and ``simulate`` applies them. Both read scripts here, so both give the same
+motion.
 """
 
 from __future__ import annotations
@@ -34,15 +35,15 @@ from ..simulation.commands import (
 )
 
 Stamp = dict[str, Any]
-"""A command's stamp_ns and entry."""
+"""stamp_ns and entry number of a command."""
 
 RESET = {"service": "reset"}
-"""Heads a list on the schedule topic: the reset and the list are taken together."""
+"""First entry of a list on the schedule topic that resets the simulation; reset and list are taken together."""
 
 
 class Schedule(NamedTuple):
-    """A message on the schedule topic: an entry, or a list of entries without its head. sent: how many entries came.
-    reset: the list is headed by RESET. more: further lists of the same script follow.
+    """A message on the schedule topic: an entry, or a list of entries without its head. sent: number of entries
+    received. reset: the list starts with RESET. more: further lists of the same script follow.
     """
 
     entries: list[Any]
@@ -53,20 +54,20 @@ class Schedule(NamedTuple):
 
 
 MESH_FRAME = "body/mesh"
-"""Frame of a point in mesh coordinates, where the body frame's own name isn't known."""
+"""Frame of a point in mesh coordinates where the name of the body frame isn't known."""
 
 MAX_TIME_S = 1e9
 MAX_ENTRIES = 1_000_000
-"""Commands a script may expand to: beyond it a mistyped duration is likelier than a wish."""
+"""Largest number of commands of a script: more is likelier a mistyped duration than an intention."""
 
 MAX_SCHEDULED = 5000
-"""Commands that a message on the schedule topic may stand for."""
+"""Largest number of commands of a message on the schedule topic."""
 
 MAX_SCHEDULE_LENGTH = 1_000_000
-"""Characters of a message on the schedule topic: 5000 entries and some."""
+"""Longest message on the schedule topic [characters]: room for 5000 entries."""
 
 MAX_YAML_LENGTH = 10_000
-"""Of a message that isn't JSON, which is read a hundred times as fast: the body would wait."""
+"""Longest message that isn't JSON [characters]. YAML takes a hundred times as long to read and would delay the body."""
 
 _REPEATING = {"repeat", "every", "jitter"}
 _TIMING_KEYS = {"t", "seed"} | _REPEATING
@@ -74,21 +75,23 @@ _WRENCH_KEYS = {"at", "force", "push", "torque", "axes", "duration", "slot"}
 _POKE_KEYS = _TIMING_KEYS | _WRENCH_KEYS | {"impulse", "angular_impulse"}
 _STRING_KEYS = {"attach", "target"}
 
-# Read
+# Reading
 
 
 def read_script(path: str | Path) -> list[Command]:
-    """The commands of a script file in order of time; raises InputError naming file, entry and what is accepted."""
+    """The commands of a script file in order of time. Raises InputError, which names file, entry and what is
+    accepted.
+    """
     return parse_script(read_text(Path(path), "a poke script"), str(path))
 
 
 def parse_script(text: str, name: str = "script") -> list[Command]:
-    """As ``read_script``, from text."""
+    """The commands of a script's text, as ``read_script`` gives them."""
     return expand_script(load_items(text, name), name)
 
 
 def read_schedule(text: str) -> Schedule:
-    """What a message on the schedule topic says: an entry, or a list of entries, of which the first may be
+    """Read a message on the schedule topic: an entry, or a list of entries. The first entry of a list may be
     ``{service: reset}`` and may have ``more: true``, alone or beside its own keys. JSON, which is YAML, may be longer
     and is read faster. Raises InputError.
     """
@@ -113,16 +116,16 @@ def read_schedule(text: str) -> Schedule:
 
 
 def expand_schedule(schedule: Schedule) -> list[Command]:
-    """The commands of what ``read_schedule`` gives, in the order in which they are listed; raises InputError."""
+    """The commands of a schedule in the order of its entries. Raises InputError."""
     first = 1 + schedule.sent - len(schedule.entries)
     commands = expand_script(schedule.entries, "schedule", MAX_SCHEDULED, first)
-    # As listed, which only matters among those that act at once because their time is past.
+    # The order of entries matters only among commands that act at once because their time is past.
     return sorted(commands, key=attrgetter("entry"))
 
 
 def expand_script(entries: Any, name: str = "script", max_commands: int = MAX_ENTRIES, first: int = 1) -> list[Command]:
-    """As ``parse_script``, from what its YAML says: entries in a list or one after another, or nothing. first: number
-    of the first entry.
+    """The commands of a script's parsed YAML, as ``parse_script`` gives them. entries: a list, an iterator or None.
+    first: number of the first entry.
     """
     if entries is None:
         entries = []
@@ -140,8 +143,8 @@ def expand_script(entries: Any, name: str = "script", max_commands: int = MAX_EN
 def expand_entry(
     entry: Any, name: str, number: int = 1, max_commands: int = MAX_ENTRIES, now_ns: int | None = None
 ) -> list[Command]:
-    """The commands of the ``number``-th entry of a script in order of time. now_ns: when an entry without a time acts;
-    None where each has one. Numbers and vectors may be NumPy's. Raises InputError.
+    """The commands of the ``number``-th entry of a script in order of time. now_ns: the time at which an entry without
+    a time acts; None if every entry must have one. Numbers and vectors may be NumPy's. Raises InputError.
     """
     key = ""
     try:
@@ -161,8 +164,9 @@ def expand_entry(
 
 
 def _times_ns(entry: Any, number: int, max_commands: int, now_ns: int | None) -> list[int]:
-    """When the ``number``-th entry acts: at t, or now, again ``every`` seconds for ``repeat`` times in all, each moved
-    by up to ±``jitter``: a uniform random shift, the same for the same seed wherever and whenever the script is read.
+    """Times [ns] at which the ``number``-th entry acts: at t, or now, and again ``every`` seconds for ``repeat`` times
+    in all. Each is shifted by a uniform random time within ±``jitter``, the same for the same seed wherever and
+    whenever the script is read.
     """
     if not isinstance(entry, dict):
         raise InputError("", entry, "a mapping such as {t: 0.5, force: [0, 0, 1]}")
@@ -253,10 +257,10 @@ _READERS: Mapping[str, Callable[[Any, Stamp], list[Command]]] = {
     "set": _set,
     "service": _service,
 }
-"""By the key that says what an entry is; one without any is a poke."""
+"""Readers by the key that determines the kind of an entry; an entry with none of these keys is a poke."""
 
 ENTRY_KEYS: Set[str] = _POKE_KEYS | _READERS.keys()
-"""The keys that an entry may have."""
+"""All keys of entries."""
 
 
 def _load(held: bool, entry: dict[str, Any], stamp: Stamp) -> WrenchCommand:
@@ -307,7 +311,9 @@ def _point(at: object) -> tuple[Any, ...]:
 
 
 def _check_keys(entry: dict[str, Any], known: Set[str], others: Set[str] = frozenset()) -> None:
-    """others: keys of other kinds of entries, one of which may be meant."""
+    """Raises InputError for a key that isn't known. others: keys of other kinds of entries, which may have been
+    meant.
+    """
     if entry.keys() <= known:
         return
     unknown = [str(key) for key in entry if key not in known]
@@ -319,7 +325,7 @@ def _check_keys(entry: dict[str, Any], known: Set[str], others: Set[str] = froze
 
 def _number(value: Any, field: str, lower: float = -1e100, upper: float = 1e100) -> float:
     if type(value) is float and lower <= value <= upper:
-        return value  # as most are: a script may have thousands
+        return value  # the usual case, checked first: a script may have thousands
     value = plain(value)
     if isinstance(value, bool) or not isinstance(value, (int, float)) or not lower <= value <= upper:
         raise InputError(field, value, f"a number from {lower:g} to {upper:g}")
@@ -343,21 +349,23 @@ def _numbers(values: Any, field: str, count: int) -> tuple[float, ...]:
 
 
 def at_contact(command: TieString, contacts: Mapping[str, Vector]) -> TieString:
-    """The command with its point (mesh coordinates) in place of the name of a contact; raises InputError."""
+    """The command with the name of its contact replaced by the contact's point (mesh coordinates). Raises
+    InputError.
+    """
     if command.contact not in contacts:
         known = ", ".join(sorted(contacts)) or "none"
         raise InputError("string, attach", command.contact, f"a contact of the body ({known}) or [x, y, z]")
     return replace(command, point=contacts[command.contact], contact="")
 
 
-# Written
+# Writing
 
 
 def entry_of(command: Command) -> dict[str, Any]:
-    """The command as an entry of a script, without its time.
+    """The command as a script entry without its time.
 
-    Raises InputError for what no entry can say: an impulse along a normal, an inertia message, a knot in other than
-    mesh coordinates.
+    Raises InputError for a command that no entry can express: an impulse along a normal, an inertia message, a knot
+    that isn't in mesh coordinates.
     """
     match command:
         case WrenchCommand():
@@ -415,13 +423,14 @@ def _load_entry(command: WrenchCommand) -> dict[str, Any]:
 
 
 def script_text(entries: Iterable[Mapping[str, Any]]) -> str:
-    """The text of a script file with these entries."""
+    """The text of a script file of these entries."""
     return "".join(f"- {flow(entry)}\n" for entry in entries) or "[]\n"
 
 
 def schedules(script: list[Command], start_ns: int = 0) -> Iterator[tuple[int, list[dict[str, Any]]]]:
-    """The lists on the schedule topic that a script is sent by, in order of time: when its commands act [ns], and its
-    entries, one a command. Commands of one instant are one list, so that they act in its order. Raises InputError.
+    """The lists that send a script on the schedule topic, in order of time: the time at which the commands of each act
+    [ns], and one entry per command. Commands of the same time are one list, so that they act in its order. Raises
+    InputError.
     """
     for t_ns, commands in groupby(script, key=attrgetter("stamp_ns")):
         time_ns = start_ns + t_ns

@@ -1,10 +1,11 @@
 # SPDX-License-Identifier: MIT
-"""How far the end of a motion moves when it is made ten times as accurate, by a second flight with the same commands.
+"""Sensitivity: the difference between the final states of a flight and of a second, ten times as accurate flight with
+the same commands.
 
-Errors of a chaotic motion grow exponentially, of which no error of a single step tells: an undamped spring whose knot
-passes its free end may be off by a radian after some seconds, though every step meets its accuracy. Where two flights
-agree, the first one's end is about as good as they do. Source: Hairer, Nørsett and Wanner, Solving Ordinary
-Differential Equations I (1993), section II.4, on comparison with a more accurate result.
+Errors of a chaotic motion grow exponentially, which the error of a single step doesn't show: an undamped spring whose
+knot passes its free end may be off by a radian after some seconds although every step meets the accuracy. If the two
+flights agree, the first one's final state is about as accurate as their difference. Source: Hairer, Nørsett and Wanner,
+Solving Ordinary Differential Equations I (1993), section II.4, on comparison with a more accurate result.
 """
 
 from __future__ import annotations
@@ -25,13 +26,13 @@ from .scenario import Scenario
 from .scenario_run import OfflineRun, after_change
 
 FINER = 10.0
-"""How many times smaller the second flight's errors are."""
+"""Ratio of the first flight's errors to the second's."""
 
 
 def finer_values(parameters: Parameters, order: int | None) -> dict[str, float]:
-    """The parameter, by name, that makes a motion FINER times as accurate. An integrator that chooses its steps, whose
-    order is None, takes another accuracy; the step of one of order p is divided by the p-th root of FINER. Raises
-    InputError where that is less than the parameter may be.
+    """The parameter, by name, and the value that makes a motion FINER times as accurate. For an integrator that
+    controls its step, whose order is None, it is the accuracy. For one of order p, the step is divided by the p-th root
+    of FINER. Raises InputError if that is below the parameter's bound.
     """
     if order is None:
         name, factor, value = "accuracy", FINER, parameters.accuracy / FINER
@@ -46,29 +47,29 @@ def finer_values(parameters: Parameters, order: int | None) -> dict[str, float]:
 
 
 def finer(scenario: Scenario) -> Scenario:
-    """The same scene, FINER times as accurate; raises InputError."""
+    """The scene, FINER times as accurate. Raises InputError."""
     return scenario.with_changes(finer_values(scenario.parameters, scenario.setup.integrator.order))
 
 
 class FinerRun(OfflineRun):
-    """The run of a script FINER times as accurate, also behind a command that sets the accuracy or the integrator."""
+    """The run of a script FINER times as accurate, also after a command that sets the accuracy or the integrator."""
 
     def __init__(self, scenario: Scenario, script: Iterable[Command]) -> None:
         self._asked = scenario
         super().__init__(finer(scenario), script)
 
     def setup_of(self, command: Change, at_hand: Scenario | None = None) -> Setup:
-        """Put in force what a change makes of the scene that was asked for, made finer."""
+        """Apply a change to the original scene, then make the result finer."""
         self._asked = after_change(self._asked, command, at_hand)
         return self.replace(finer(self._asked))
 
 
 def sensitivity_of(simulation: Simulation, scenario: Scenario, script: Iterable[Command]) -> dict[str, Any]:
-    """How far the end of this simulation of a scene and a script is from that of a flight FINER times as accurate:
-    DIFFERENCES [rad, m, m/s, rad/s], the parameter that was finer, and what the second flight took [s, wall]; None for
-    all differences where one of the two motions failed.
+    """The difference between the final states of this simulation of a scene and a script and of a flight FINER times as
+    accurate: DIFFERENCES [rad, m, m/s, rad/s], the parameter that was finer, and the wall time of the second flight
+    [s]. All differences are None if one of the two motions failed.
 
-    Raises InputError where nothing finer can be asked for.
+    Raises InputError if no finer value is permitted.
     """
     began = time.perf_counter()
     second = FinerRun(scenario, script)

@@ -1,2 +1,2 @@
 # SPDX-License-Identifier: MIT
-"""Sweeps: many variations of one scene, measured into one table."""
+"""Sweeps: many variations of a scene, measured into one table."""

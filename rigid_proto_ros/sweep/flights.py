@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Flights from Python, without ROS: load a scene, command, step, sample, record, and many of them on all cores.
+"""Flights from Python, without ROS: load a scene, command, step, sample, record; or fly many on all cores.
 
     scene = load_scene("t_handle", {"publish_rate": 50.0})
     with Flight(scene, record="out/flight.mcap") as flight:
@@ -7,8 +7,8 @@
             flight.command({"wrench": {"axes": "body", "torque": torque(flight.sample())}})
             flight.step(0.02)
 
-Commands are entries of a poke script without their ``t``, and the motion is the one that the node flies: a recording
-replays to the bit. msg_examples/06_python_flight.py tunes a controller.
+Commands are poke script entries without ``t``. The motion is the node's: a recording replays bit for bit.
+msg_examples/06_python_flight.py tunes a controller.
 """
 
 from __future__ import annotations
@@ -43,13 +43,13 @@ from .table import chunks
 from .workers import Threads, cores
 
 Scene = Scenario
-"""A checked scene. It can be flown any number of times, and goes to other processes."""
+"""A checked scene. It can be flown any number of times and can be pickled for other processes."""
 
 Commands = tuple[Command, ...]
-"""What ``read_command`` makes of an entry."""
+"""The commands of an entry, as ``read_command`` returns them."""
 
 MOST_GIVEN = 100_000
-"""Commands of a flight that are kept for ``Flight.sensitivity``: some tens of megabytes."""
+"""Largest number of commands that a flight keeps for ``Flight.sensitivity``: some tens of megabytes."""
 
 _MAX_TIME_NS = nanoseconds(MAX_TIME_S)
 
@@ -58,22 +58,24 @@ Result = TypeVar("Result")
 
 
 def load_scene(name: str, settings: Mapping[str, object] | None = None) -> Scene:
-    """A scene file by path or bundled name, parameters on top as ``{"gravity": [0, 0, -9.81]}``; raises InputError."""
+    """Load a scene file by path or bundled name, with parameters on top, such as ``{"gravity": [0, 0, -9.81]}``. Raises
+    InputError.
+    """
     return read_scene(name, plain(settings or {}), lambda warning: print(warning, file=sys.stderr))
 
 
 def read_command(entry: Mapping[str, object], now_ns: int = 0) -> Commands:
-    """An entry of a poke script, read once: it can be given to any flight, any number of times, and acts at its ``t``,
-    or ``now_ns``, or later. Raises InputError.
+    """Read a poke script entry once. The result can be given to any flight any number of times. It acts at its ``t``,
+    or at ``now_ns`` without one; if that is past, at once. Raises InputError.
     """
-    if not isinstance(entry, (dict, Mapping)):  # a mapping's own check is slow
+    if not isinstance(entry, (dict, Mapping)):  # the check for Mapping is slow
         raise InputError("command", entry, "a mapping such as {'force': [0, 0, 1]}")
     return tuple(expand_entry(dict(entry), "command", now_ns=now_ns))
 
 
 class Flight:
-    """One body in flight, from time 0. record: an .mcap file for all states and commands; close the flight then, as the
-    ``with`` statement does. observer: whoever else is told (simulation/observer.py).
+    """A flight of one body from time 0. record: an .mcap file for all states and commands; it is complete once the
+    flight is closed, which the ``with`` statement does. observer: is notified of events (simulation/observer.py).
     """
 
     def __init__(self, scene: Scene, record: str | Path = "", observer: Observer | None = None) -> None:
@@ -89,8 +91,8 @@ class Flight:
         self._scene = scene
         self._run = OfflineRun(scene, observer=observer)
         self._simulation = self._run.simulation
-        self._given: list[tuple[int, Sequence[Command]]] = []  # and when they were
-        self._told: dict[str, int] = {}  # refused commands, by reason
+        self._given: list[tuple[int, Sequence[Command]]] = []  # each with the time at which it was given
+        self._told: dict[str, int] = {}  # number of refused commands already reported, by reason
 
     def __enter__(self) -> Flight:
         return self
@@ -99,16 +101,16 @@ class Flight:
         self.close()
 
     def reset(self, scene: Scene | None = None) -> None:
-        """Begin again at time 0 of the scene, or of another one, in a tenth of a new flight's time; what was commanded
-        is dropped, and a recording has another run.
+        """Start again at time 0 of the scene, or of another one, in a tenth of the time of a new flight. Pending
+        commands are dropped, and a recording gets another run.
         """
         self._scene = scene or self._scene
         self._given.clear()
         self._run.restart(self._scene)
 
     def command(self, entry: Mapping[str, object] | Commands) -> None:
-        """Let an entry of a poke script, or one that ``read_command`` has read, act now, after those given before; with
-        ``t`` at that time [s, simulated] or later. Raises InputError for one that can't be taken.
+        """Give a poke script entry or the result of ``read_command``. It acts now, after those given before; an entry
+        with ``t`` acts at that simulated time [s] or later. Raises InputError for a command that is refused.
         """
         run, now_ns = self._run, self._simulation.time_ns
         commands = entry if isinstance(entry, tuple) else read_command(entry, now_ns)
@@ -117,8 +119,8 @@ class Flight:
             self._given.append((now_ns, commands))
 
     def step(self, seconds: float) -> State:
-        """Simulate so long, and return the state at the end. Raises InputError for no such time, when the motion fails,
-        or when a command is refused as it comes to act.
+        """Simulate for a duration [s] and return the final state. Raises InputError for an invalid duration, if the
+        motion fails, or if a command is refused when it is due.
         """
         simulation = self._simulation
         until_ns = _end_ns(simulation.time_ns, seconds)
@@ -134,8 +136,8 @@ class Flight:
     def fly(
         self, commands: Iterable[Mapping[str, object] | Commands], seconds: float, scene: Scene | None = None
     ) -> State:
-        """``reset``, ``command`` for each and ``step`` in one, which is quicker: begin again at time 0 of the scene, or
-        of another one, let these commands act, simulate so long, and return the state at the end. Raises InputError.
+        """Do ``reset``, ``command`` for each and ``step`` in one faster call: start at time 0 of the scene, or of
+        another one, give these commands, simulate for a duration [s], and return the final state. Raises InputError.
         """
         simulation, until_ns = self._simulation, _end_ns(0, seconds)
         read: list[Command] = []
@@ -149,7 +151,7 @@ class Flight:
         return simulation.state
 
     def _trouble(self) -> InputError:
-        """Why the motion has failed, or which commands were refused as they came to act and haven't been told of."""
+        """The error of a failed motion, or of commands that were refused when due and not yet reported."""
         simulation = self._simulation
         before, self._told = self._told, simulation.refused.copy()
         if simulation.failure:
@@ -159,24 +161,25 @@ class Flight:
         return CommandRefused("schedule", "command", f"refused when it was due to act: {'; '.join(texts)}")
 
     def sample(self) -> State:
-        """The state now: time_ns, position, orientation_xyzw, linear_velocity, angular_velocity, angular_velocity_body;
-        before what was commanded at this very time has acted.
+        """The present state: time_ns, position, orientation_xyzw, linear_velocity, angular_velocity,
+        angular_velocity_body. Commands given at this very time have not acted in it.
         """
         return self._simulation.state
 
     @property
     def accuracy_floor(self) -> str:
-        """Why, since time 0, rounding and not the accuracy asked for has set what the motion errs; empty where it
-        hasn't.
+        """Why rounding, and not the requested accuracy, has determined the error of the motion since time 0; empty if
+        it has not.
         """
         return self._simulation.accuracy_floor
 
     def sensitivity(self) -> dict[str, float]:
-        """How far the present state is from that of a second flight, ten times as accurate, which this simulates from
-        time 0 with the same commands: ``attitude`` [rad], ``position`` [m], ``velocity`` [m/s] and ``spin`` [rad/s].
+        """The difference between the present state and that of a second flight, ten times as accurate, which is
+        simulated from time 0 with the same commands: ``attitude`` [rad], ``position`` [m], ``velocity`` [m/s] and
+        ``spin`` [rad/s].
 
-        Raises InputError where nothing more accurate can be asked for, the motion failed, or more than MOST_GIVEN
-        commands were given, which aren't kept.
+        Raises InputError if no finer accuracy is permitted, if the motion failed, or after more than MOST_GIVEN
+        commands, since further ones are not kept.
         """
         if self._run.submitted > MOST_GIVEN:
             raise InputError("sensitivity", "more commands", f"a flight of at most {MOST_GIVEN} commands")
@@ -198,8 +201,8 @@ class Flight:
 
 
 def _end_ns(begin_ns: int, seconds: float) -> int:
-    """When a step ends. Raises InputError."""
-    # A difference of two times may be a rounding below 0.
+    """Time at which a step ends [ns]. Raises InputError."""
+    # Not < 0: the difference of two times may be slightly negative by rounding.
     step_ns = nanoseconds(seconds) if isinstance(seconds, (float, Real)) and abs(seconds) <= MAX_TIME_S else -1
     if step_ns < 0:
         raise InputError("step", seconds, f"a number of seconds from 0 to {MAX_TIME_S:g}")
@@ -209,8 +212,8 @@ def _end_ns(begin_ns: int, seconds: float) -> int:
 
 
 def fly_study(spec: Mapping[str, object]) -> dict[str, NDArray[Any]]:
-    """All rows of a study, which is given as its file says it, on all cores: the columns of its table by name. Rows
-    that differ in numbers alone are flown without any Python code in between. Raises InputError.
+    """Fly all rows of a study on all cores. spec: the content of a study file. Returns the columns of its table by
+    name. Rows that differ only in numbers are flown in compiled code throughout. Raises InputError.
     """
     study = make_study(plain(spec))
     workers = Threads(study)
@@ -222,8 +225,8 @@ def fly_study(spec: Mapping[str, object]) -> dict[str, NDArray[Any]]:
 
 
 def fly_all(function: Callable[[Value], Result], values: Iterable[Value], workers: int = 0) -> Iterator[Result]:
-    """``function`` of each value, in their order, by so many processes, or one a core. function: one that other
-    processes can import.
+    """Apply ``function`` to each value in worker processes, one per core by default, and yield the results in the order
+    of values. function: importable by other processes.
     """
     values = list(values)
     workers = workers or cores()
@@ -233,7 +236,7 @@ def fly_all(function: Callable[[Value], Result], values: Iterable[Value], worker
 
 
 def _depend_on_the_parent() -> None:
-    """Interrupts are the parent's to handle; and a worker doesn't outlive a parent that was killed."""
+    """Leave interrupts to the parent, and end if the parent is killed."""
     signal.signal(signal.SIGINT, signal.SIG_IGN)
     threading.Thread(target=_end_with_the_parent, daemon=True).start()
 

@@ -1,6 +1,6 @@
 # SPDX-License-Identifier: MIT
-"""What a study measures and when it samples the flight: names in the file become rows of numbers for the
-compiled measure.
+"""What a study measures and when it samples the flight. Names in the file become rows of numbers for the compiled
+measure.
 """
 
 from __future__ import annotations
@@ -19,15 +19,15 @@ from ..simulation.quantities import DIFFERENCES, NAMES, QUANTITIES, TURNED
 from .fields import known_name, mapping, names, number
 
 MAX_SAMPLES = 100_000
-"""Samples of one flight: a state is kept of each."""
+"""Largest number of samples of a flight; a state of each is kept in memory."""
 KINDS = ("final", "max", "min", "flips", "first", "difference", "sensitivity")
 _STATE_PARTS = {"position": 3, "orientation": 4, "velocity": 3, "spin": 3}
 
 
 @dataclass(frozen=True)
 class Measures:
-    """columns: names of what is measured, rows of ``table`` (k, MEASURE). sample_ns (m,) ascending, the last at the
-    end.
+    """columns: names of the measures, which are the rows of ``table`` (k, MEASURE). sample_ns (m,): sample times,
+    ascending; the last is the end.
     """
 
     columns: tuple[str, ...]
@@ -36,17 +36,17 @@ class Measures:
 
     @property
     def needs_reference(self) -> bool:
-        """Something is compared with the reference."""
+        """Whether anything is compared with the reference."""
         return bool((self.table[:, fm.KIND] == fm.DIFFERENCE).any())
 
     @property
     def needs_finer(self) -> bool:
-        """The reference is the same motion, ten times as accurate."""
+        """Whether the reference is the same motion, ten times as accurate."""
         return any(name.startswith("sensitivity.") for name in self.columns)
 
 
 def read_measures(spec: Any, watch: float, duration_s: float, field: str) -> Measures:
-    """What ``measure`` of a study says; raises InputError naming the field."""
+    """Read ``measure`` of a study. Raises InputError, which names the field."""
     spec = mapping({"final": ["position", "orientation", "velocity", "spin"]} if spec is None else spec, field, KINDS)
     duration_ns = nanoseconds(duration_s)
     sample_ns: list[int] = []
@@ -71,7 +71,7 @@ def _rows(kind: str, value: Any, field: str) -> list[tuple[str, list[float]]]:
         known = (*_STATE_PARTS, *(name for name in NAMES if name not in _STATE_PARTS))
         chosen: list[str] = []
         for name in names(value, field, known):
-            # Parts of a state stand for their components.
+            # The name of a vector in the state stands for all its components.
             parts = _STATE_PARTS.get(name)
             chosen += [f"{name}.{axis}" for axis in "xyzw"[:parts]] if parts else [name]
         return [(name, [fm.FINAL, NAMES.index(name)]) for name in chosen]
@@ -99,7 +99,7 @@ def _flips(value: Any, field: str) -> list[float]:
 
 
 def _conditions(spec: Any, field: str) -> dict[str, list[float]]:
-    """Conditions by name: quantity number, sign and limit."""
+    """Conditions by name: index of the quantity, sign and limit."""
     if not isinstance(spec, dict):
         raise InputError(field, spec, "names with {quantity, above} or {quantity, below}")
     found = {}

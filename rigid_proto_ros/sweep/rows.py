@@ -1,9 +1,9 @@
 # SPDX-License-Identifier: MIT
-"""Some rows of a study, flown and measured: what a thread of a sweep does.
+"""Fly and measure a range of a study's rows: the work of one thread of a sweep.
 
-Rows that differ in numbers alone, of parameters and of pokes and wrenches in the script, go through the compiled batch
-together, filled by columns. Those that it can't fly or check are flown one by one by ``Simulation``, which is what a
-row is by definition, with the same bits.
+Rows that differ only in numbers of parameters and of the script's pokes and wrenches go through the compiled batch
+together, filled by columns. Rows that the batch can't fly or check are flown one by one with ``Simulation``. Both give
+the same bits; ``Simulation`` is the definition of a row.
 """
 
 from __future__ import annotations
@@ -38,24 +38,24 @@ from .study import Study, Variation, Vary, vertex_number
 from .targets import Target
 
 _LOADS = {"force": FORCE, "impulse": FORCE, "push": FORCE, "torque": TORQUE, "angular_impulse": TORQUE}
-"""Where the numbers of a script's entry stand in its load."""
+"""Index of an entry's numbers in its load, by key."""
 
 _BOUNDS = {"at_ns": (0.0, MAX_TIME_S), "duration_ns": (1e-9, MAX_TIME_S), "load": (-HUGE, HUGE)}
-"""Of numbers written into a table of commands [s, N, N m], by its fields."""
+"""Bounds of numbers in a table of commands [s, s, N or N m], by field."""
 
 
 class NotBatchable(Exception):
-    """The compiled batch can't fly the rows of a study; the simulation can."""
+    """The compiled batch can't fly the rows of a study; ``Simulation`` can."""
 
 
 def _is_number_of_scene(parameter: str) -> bool:
-    """Whether a parameter is one of the numbers in a scene's record."""
+    """Whether a parameter is a number in a scene's record."""
     return parameter in SCENE_PARAMETERS and parameter_named(parameter).type in ("double", "doubles")
 
 
 class BatchMaker:
-    """Makes batches of a study's rows, or of the flights that it compares with when there is a ``reference``:
-    parameters that those have otherwise. Raises NotBatchable or InputError where the simulation must fly the rows.
+    """Makes batches of a study's rows, or of their references. reference: parameters that differ in a reference flight;
+    None for the rows themselves. Raises NotBatchable or InputError if ``Simulation`` must fly the rows.
     """
 
     def __init__(self, study: Study, reference: dict[str, Value] | None) -> None:
@@ -74,7 +74,9 @@ class BatchMaker:
             raise NotBatchable
 
     def batch(self, columns: list[NDArray[Any]], count: int) -> tuple[batch.Batch, BoolArray]:
-        """``count`` rows with these values of what varies, and which of them the batch may check (n,)."""
+        """A batch of ``count`` rows with these varied values, and which rows (n,) the batch may fly: those with numbers
+        within bounds.
+        """
         good = np.ones(count, bool)
         rows = np.repeat(np.array([self._setup.scene], SCENE), count)
         commands = np.repeat(self._table[None], count if any(self._written) else 1, axis=0)
@@ -87,13 +89,13 @@ class BatchMaker:
                     own[:, vary.target.path[0]] = column
                 else:
                     own[:] = column[:, None] if own.ndim > column.ndim else column
-        # Stable: equal times act in the order of the script.
+        # A stable sort: commands at equal times act in the order of the script.
         order = np.argsort(commands["at_ns"], axis=1, kind="stable")
         return batch.Batch(rows, self._setup.mesh, np.take_along_axis(commands, order, axis=1)), good
 
 
 def _commands_of(script: list[Any], setup: Setup) -> tuple[Records, list[int]]:
-    """A table (c,) LOAD_ROW of the script's pokes and wrenches in its own order, and the entries (c,) they are of."""
+    """A table (c,) LOAD_ROW of the script's pokes and wrenches in the order of entries, and the entry numbers (c,)."""
     commands = sorted(expand_script(script, "script"), key=lambda command: command.entry)
     table = np.zeros(len(commands), fl.LOAD_ROW)
     for row, command in zip(table, commands, strict=True):
@@ -110,11 +112,11 @@ def _commands_of(script: list[Any], setup: Setup) -> tuple[Records, list[int]]:
 
 
 Place = tuple[int, str, slice | int]
-"""Row of a table of commands, its field, and which numbers of that."""
+"""Row of a table of commands, field of the row, and indices in the field."""
 
 
 def _place_of(vary: Vary, script: list[Any], entries: list[int]) -> Place:
-    """Where the numbers of what varies in the script stand in its table of commands."""
+    """Place of a varied number of the script in its table of commands."""
     target: Target = vary.target
     is_number = isinstance(vary.form, Draw) or vary.form.array.dtype == np.float64
     if entries.count(target.entry) != 1 or "jitter" in script[target.entry - 1] or not is_number:
@@ -140,27 +142,27 @@ def _write(commands: Records, place: Place, column: FloatArray, good: BoolArray)
     if name == "load":
         commands[name][:, row, where] = values
     else:
-        # To the nearest nanosecond, halves to even, as round() has it.
+        # Rounded to the nearest nanosecond, ties to even, as round() does.
         commands[name][:, row] = np.rint(values * 1e9)
 
 
 def _keep(good: BoolArray, within: BoolArray) -> None:
-    """Only rows whose numbers (n,) or (n, k) are within bounds are good any more."""
+    """Clear ``good`` for rows with numbers (n,) or (n, k) out of bounds."""
     good &= within if within.ndim == 1 else within.all(axis=1)
 
 
 class FailedFlight(Exception):
-    """Why a row has no result."""
+    """A row has no result; the message says why."""
 
 
 _NO_ROW = (InputError, TypeError, AttributeError, KeyError, IndexError)
-"""Raised where values don't fit the scene or its script together."""
+"""Exceptions for values that don't fit the scene or its script together."""
 
 
 @dataclass
 class Chunk:
-    """Columns of a table by name: float64, int64, or objects (text or None). simulated: how many rows the
-    simulation flew.
+    """Columns of a table by name: float64, int64, or objects (text or None). simulated: number of rows flown with
+    ``Simulation``.
     """
 
     columns: dict[str, NDArray[Any]]
@@ -172,8 +174,8 @@ class Chunk:
 
 @lru_cache(maxsize=16)
 def _sides(study: Study) -> list[BatchMaker]:
-    """What makes batches of the study's rows, and then of their references if it has any; none where the simulation
-    must fly them.
+    """Makers of batches for the study's rows and, if it has a reference, for the references. Empty if ``Simulation``
+    must fly the rows.
     """
     try:
         references = [] if study.reference is None else [BatchMaker(study, dict(study.reference))]
@@ -183,7 +185,7 @@ def _sides(study: Study) -> list[BatchMaker]:
 
 
 def run_chunk(study: Study, first: int, last: int) -> Chunk:
-    """Rows first to last − 1; a row that fails is a row with its reason."""
+    """Fly rows first to last − 1. A row that fails has the reason in its ``failure``."""
     rows, measures = np.arange(first, last, dtype=np.int64), study.measures
     columns = study.columns(rows)
     results = batch.new_results(len(rows), len(measures.table))
@@ -204,7 +206,7 @@ def run_chunk(study: Study, first: int, last: int) -> Chunk:
 
 
 def row_summary(study: Study, row: int) -> dict[str, Any]:
-    """The row of the table by column, as JSON has it."""
+    """A row of the table by column, as JSON values."""
     columns = run_chunk(study, row, row + 1).columns
     found: dict[str, Any] = {}
     for name, column in columns.items():
@@ -214,8 +216,8 @@ def row_summary(study: Study, row: int) -> dict[str, Any]:
 
 
 def simulate_row(study: Study, row: Variation, i: int, results: batch.Results) -> None:
-    """The row's flight by ``Simulation``, beside its reference if the study has one, into results i; raises
-    FailedFlight, InputError.
+    """Fly a row with ``Simulation``, and its reference if the study has one, and measure it into row i of results.
+    Raises FailedFlight, InputError.
     """
     measures = study.measures
     states, others = (np.zeros((len(measures.sample_ns), STATE)) for _ in range(2))
@@ -234,7 +236,7 @@ def simulate_row(study: Study, row: Variation, i: int, results: batch.Results) -
 def _simulate(
     scenario: Scenario, commands: list[Command], sample_ns: IntArray, states: FloatArray, context: FloatArray
 ) -> Simulation:
-    """Fill ``states`` at the sample times, and the context; the simulation at their end."""
+    """Fill ``states`` at the sample times, and the context. Returns the simulation at the last of them."""
     simulation = OfflineRun(scenario, commands).simulation
     simulation.fill_state(states[0])
     begin_context(states[0], context)
@@ -244,7 +246,7 @@ def _simulate(
             raise FailedFlight(simulation.failure)
         simulation.fill_state(state)
     if simulation.refused:
-        # A row whose commands were refused in flight isn't the row that was asked for.
+        # A row with refused commands is not the flight that was asked for.
         refused = simulation.refused.items()
         texts = (f"commands refused: {count}, {reason}: {simulation.refusals[reason]}" for reason, count in refused)
         raise FailedFlight("; ".join(texts))
@@ -282,7 +284,7 @@ def _as_objects(column: NDArray[np.object_]) -> NDArray[np.object_]:
 
 
 def _vertices(study: Study, columns: list[NDArray[Any]], uniforms: FloatArray) -> IntArray:
-    """Vertex numbers (n,) that uniform numbers (n,) choose on each row's mesh; −1 where that can't be read."""
+    """Vertex indices (n,) that uniform numbers (n,) select on each row's mesh; −1 where the mesh can't be read."""
     numbers = np.full(len(uniforms), -1)
     of_mesh = {v.target.name: c for v, c in zip(study.vary, columns, strict=True) if v.target.name.startswith("mesh")}
     for i, uniform in enumerate(uniforms):
@@ -295,7 +297,7 @@ def _vertices(study: Study, columns: list[NDArray[Any]], uniforms: FloatArray) -
 
 
 def write_scene(study: Study, row: int, file: Path) -> dict[str, Any]:
-    """Write a row as a scene, its script beside it as NAME_script.yaml; returns the file and the command that flies
+    """Write a row as a scene, and its script beside it as NAME_script.yaml. Returns the file and the command that flies
     it.
     """
     variation = study.variation(row)

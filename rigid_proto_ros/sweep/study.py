@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: MIT
-"""A study: one scene, one script, what varies, what is measured. Read and checked whole before anything runs.
+"""A study: a scene, a script, what varies and what is measured. It is read and checked completely before anything runs.
 
-Row i is a function of the study and i alone. Grids make every combination, the first one slowest; lists go in step with
-one another and count as one more grid; each combination is drawn ``samples`` times where something is random.
+Row i is a function of the study and i only. Grids give all combinations, the first grid varying slowest. All lists
+advance together and count as one more grid. If anything is random, each combination is drawn ``samples`` times.
 """
 
 from __future__ import annotations
@@ -50,12 +50,12 @@ from .targets import Target, read_target
 MAX_ROWS = 10_000_000
 _KEYS = ("scene", "script", "duration", "set", "vary", "reference", "seed", "samples", "watch", "measure")
 MESHES_KEPT = 16
-"""Meshes with their moments that a study keeps."""
+"""Largest number of meshes, with their moments, that a study caches."""
 
 
 class Meshes:
-    """Meshes with their moments, each read once. contents: of some of them by name, instead of what the files hold, or
-    why they can't be read.
+    """Meshes with their moments, each read once. contents: by name, meshes to use instead of reading the files, or the
+    errors of those that can't be read.
     """
 
     def __init__(self, contents: Mapping[str, Mesh | MeshError] | None = None) -> None:
@@ -63,11 +63,11 @@ class Meshes:
         self._made = lru_cache(maxsize=MESHES_KEPT)(self._make)
 
     def __reduce__(self) -> tuple[type[Meshes], tuple[dict[str, Mesh | MeshError]]]:
-        """For another process they are made anew, from the same contents."""
+        """Pickle the contents only; another process computes the moments again."""
         return Meshes, (self._contents,)
 
     def of(self, parameters: Parameters) -> BodyMesh | None:
-        """The mesh that the parameters name; raises MeshError."""
+        """The mesh that the parameters name. Raises MeshError."""
         return self._made(parameters.mesh, parameters.mesh_repair, parameters.mesh_fallback)
 
     def _make(self, mesh: str, repair: bool, fallback: str) -> BodyMesh | None:
@@ -80,7 +80,7 @@ class Meshes:
 
 @dataclass(frozen=True)
 class Variation:
-    """One row: parameters, and the script's entries as YAML gives them."""
+    """A row: its parameters, and the script's entries as parsed YAML."""
 
     parameters: Parameters
     script: list[Any]
@@ -88,33 +88,32 @@ class Variation:
 
     @property
     def scenario(self) -> Scenario:
-        """The scenario of the parameters; raises InputError where no body or flight has them."""
+        """The scenario of the parameters. Raises InputError if no body or flight can have them."""
         return build_scenario(self.parameters, self.meshes.of(self.parameters))
 
     @property
     def commands(self) -> list[Command]:
-        """The script's commands; raises InputError."""
+        """The script's commands. Raises InputError."""
         return expand_script(self.script, "script")
 
 
 @dataclass(frozen=True)
 class Vary:
-    """One thing that varies, and how."""
+    """A varied target, and how it varies."""
 
     target: Target
     form: Levels | Draw
 
     @property
     def is_random_vertex(self) -> bool:
-        """Whether it chooses a vertex of the row's mesh."""
+        """Whether it selects a random vertex of the row's mesh."""
         return isinstance(self.form, Draw) and self.form.shape == VERTEX
 
 
 @dataclass(frozen=True, eq=False)
 class Study:
-    """parameters: of the scene that the study varies. script: as YAML gives it; ``entries`` are its list.
-    samples: rows for each combination of grid and list. reference: parameters that the reference flight has otherwise,
-    or None.
+    """parameters: of the scene that the study varies. script: entries as parsed YAML. samples: number of rows for each
+    combination of grids and lists. reference: parameters that differ in the reference flight, or None.
     """
 
     name: str
@@ -130,20 +129,22 @@ class Study:
 
     @property
     def density_decides(self) -> bool:
-        """The density varies and not the mass: the scene's own mass, which would win, doesn't count then."""
+        """Whether the density varies and the mass doesn't: the scene's mass is then ignored, since it would take
+        precedence.
+        """
         varied = {v.target.parameter for v in self.vary}
         return "density" in varied and "mass" not in varied
 
     @property
     def grids(self) -> list[int]:
-        """Levels of each grid, then of the lists, if any."""
+        """Number of levels of each grid, then of the lists, if any."""
         given = [v.form for v in self.vary if isinstance(v.form, Levels)]
         sizes = [len(form.values) for form in given if form.kind == GRID]
         return sizes + [len(form.values) for form in given if form.kind == LIST][:1]
 
     @property
     def rows(self) -> int:
-        """How many variations there are."""
+        """Number of rows."""
         return math.prod(self.grids) * self.samples
 
     def columns(self, rows: IntArray) -> list[NDArray[Any]]:
@@ -161,7 +162,7 @@ class Study:
         return found
 
     def _points(self, rows: IntArray) -> list[IntArray | None]:
-        """Which point of its grid or list each of ``vary`` has, None for a random one."""
+        """For each of ``vary``, the index of each row in its grid or list; None for a random one."""
         rest = rows // self.samples
         digits: list[IntArray] = []
         for size in reversed(self.grids):
@@ -179,11 +180,11 @@ class Study:
         return found
 
     def variation(self, row: int) -> Variation:
-        """A row, by its number."""
+        """The variation of a row."""
         return self.applied([column[0] for column in self.columns(np.array([row], np.int64))])
 
     def applied(self, chosen: list[Any]) -> Variation:
-        """The variation with these values of what varies."""
+        """The variation with these varied values."""
         changes: dict[str, Value] = {}
         values, entries = ChainMap(changes, self.parameters.named()), copy.deepcopy(self.script)
         if self.density_decides:
@@ -200,7 +201,9 @@ class Study:
 
     @cached_property
     def contents(self) -> dict[str, Mesh | MeshError]:
-        """The meshes that rows and references begin with, by name, or why one can't be read, which fails its rows."""
+        """The initial meshes of rows and references by name, or the error of one that can't be read, which fails its
+        rows.
+        """
         named = [self.parameters.mesh, (self.reference or {}).get("mesh", "")]
         for vary in self.vary:
             if vary.target.parameter == "mesh" and isinstance(vary.form, Levels):
@@ -215,7 +218,7 @@ class Study:
 
     @cached_property
     def fingerprint(self) -> str:
-        """Hash of all that its rows follow from: studies with the same have the same rows, to the bit."""
+        """Hash of everything that determines the rows: studies with equal hashes have the same rows, bit for bit."""
         measures = self.measures
         given = (
             *(sorted(self.parameters.named().items()), self.script, self.duration_ns, self.seed, self.samples),
@@ -228,12 +231,12 @@ class Study:
 
 
 def vertex_number(uniform: float, body_mesh: BodyMesh | None) -> int:
-    """Which vertex a uniform number in [0, 1) chooses; 0 without a mesh, which is then refused for want of one."""
+    """Index of the vertex that a uniform number in [0, 1) selects. 0 without a mesh, which the command then refuses."""
     return int(uniform * len(body_mesh.surface.vertices)) if body_mesh else 0
 
 
 def study_file(name: str) -> Path:
-    """The file of a study given by path or bundled name."""
+    """Path of a study given by path or bundled name. Raises InputError."""
     path = Path(name)
     if not path.is_file() and "/" not in name and name.removesuffix(".yaml") in study_names():
         return study_path(name.removesuffix(".yaml"))
@@ -251,13 +254,13 @@ def _yaml(path: Path) -> Any:
 
 
 def read_study(name: str) -> Study:
-    """A study file, by path or bundled name, checked whole; raises InputError naming the field."""
+    """Read and check a study file, by path or bundled name. Raises InputError, which names the field."""
     path = study_file(name)
     return make_study(_yaml(path), str(path), path.parent)
 
 
 def make_study(spec: Any, name: str = "study", folder: Path = Path()) -> Study:
-    """The same from what YAML gives; scene and script are found from ``folder`` on."""
+    """Make a study of parsed YAML. folder: where scene and script are searched first. Raises InputError."""
     spec = mapping(spec, name, _KEYS, ("scene", "duration", "vary"))
     scene = str(spec["scene"])
     beside = folder / scene
@@ -281,7 +284,7 @@ def make_study(spec: Any, name: str = "study", folder: Path = Path()) -> Study:
     study = Study(name, base.parameters, script, nanoseconds(duration_s), seed, samples, vary, reference, measures)
     if study.rows > MAX_ROWS:
         raise InputError(f"{name}, samples", f"{study.rows} rows in all", f"at most {MAX_ROWS}")
-    # The scene as it stands takes off with its script, and so does its reference: what fails later is the row's own.
+    # The scene itself and its reference must start with the script. Later errors belong to single rows.
     commands = expand_script(script, "script")
     OfflineRun(base, commands)
     if reference is not None:
@@ -332,7 +335,7 @@ def _vary(spec: Any, name: str, parameters: Parameters, entries: list[Any]) -> t
         if target.is_vertex and isinstance(form, Draw):
             whole_point = target.name.removesuffix(".vertex")
             raise InputError(field, how, f"a grid or list of whole numbers, or {whole_point}: random_vertex")
-        # Numbers alone need no conversion, and there may be a million of them.
+        # Numbers need no conversion, and there may be a million of them.
         if target.parameter and isinstance(form, Levels) and not {type(v) for v in form.values} <= {int, float}:
             given = [_checked(target, value, field, values, entries) for value in form.values]
             form = replace(form, values=tuple(_of_one_length(given)))
@@ -350,8 +353,8 @@ def _vary(spec: Any, name: str, parameters: Parameters, entries: list[Any]) -> t
 
 
 def _of_one_length(given: list[Any]) -> list[Any]:
-    """The same values of a parameter, vectors all of one length: a single number stands for each component. Where every
-    vector is a single number, the numbers themselves.
+    """The values of a parameter with all vectors of one length: a vector of one number stands for equal components. If
+    every vector has one number, the numbers themselves.
     """
     longest = max((len(value) for value in given if isinstance(value, list)), default=0)
     if longest == 1:
@@ -360,7 +363,7 @@ def _of_one_length(given: list[Any]) -> list[Any]:
 
 
 def _checked(target: Target, value: Any, field: str, values: Mapping[str, Value], entries: list[Any]) -> Any:
-    """Put a value where it will stand, and see whether that is accepted there; returns a parameter's as converted."""
+    """Check a value by putting it into its place. Returns a parameter's value as converted. Raises InputError."""
     changed: dict[str, Value] = {target.parameter: values[target.parameter]} if target.parameter else {}
     copied = copy.deepcopy(entries) if target.entry else []
     try:
@@ -389,7 +392,7 @@ def _reference(spec: Any, field: str) -> dict[str, Any] | None:
 
 
 def _finer(base: Scenario, vary: tuple[Vary, ...], entries: list[Any], field: str) -> Mapping[str, Value]:
-    """The reference of a sensitivity, which is one for all rows."""
+    """The reference of a sensitivity; the same for all rows."""
     of_accuracy = {"accuracy", "step", "integrator"}
     changed = {v.target.parameter for v in vary} | {v.target.path[-1] for v in vary if v.target.entry}
     for entry in entries:

@@ -1,6 +1,6 @@
 # SPDX-License-Identifier: MIT
-"""A study flown whole into a Parquet file: chunks of rows are written in order of rows as they get done, so that a
-table which was stopped has the first ones, and goes on behind them.
+"""Fly a study into a Parquet file. Chunks are written in order of rows as they are done, so a table that was
+interrupted has the first rows and can be resumed after them.
 """
 
 from __future__ import annotations
@@ -26,15 +26,15 @@ if TYPE_CHECKING:
     import pyarrow as pa
 
 KEY = b"rigid_proto_ros"
-"""Of the file's metadata: a JSON object."""
+"""Key of a JSON object in the file's metadata."""
 CHUNK_ROWS = 4096
-"""At most: then a chunk's own cost doesn't count."""
+"""Largest number of rows of a chunk; the overhead of a chunk is negligible then."""
 CHUNK_COMMANDS = 500_000
-"""Commands of scripts that a chunk keeps in memory: with a long script it has fewer rows."""
+"""Largest number of commands that a chunk keeps in memory; with a long script a chunk has fewer rows."""
 
 
 class SweepInterrupted(KeyboardInterrupt):
-    """Stopped on request, with so many rows in the table; where that is 0 there is none."""
+    """A sweep stopped on request. rows_done: number of rows in the table; without any there is no table."""
 
     def __init__(self, rows_done: int) -> None:
         self.rows_done = rows_done
@@ -42,7 +42,7 @@ class SweepInterrupted(KeyboardInterrupt):
 
 
 def arrow() -> tuple[ModuleType, ModuleType]:
-    """pyarrow and its Parquet part; raises InputError where they aren't installed."""
+    """The modules pyarrow and pyarrow.parquet. Raises InputError if they aren't installed."""
     try:
         import pyarrow
         import pyarrow.parquet
@@ -52,7 +52,7 @@ def arrow() -> tuple[ModuleType, ModuleType]:
 
 
 def as_arrow(chunk: Chunk) -> pa.Table:
-    """A chunk as a table: NaN and None are null."""
+    """A chunk as a table, in which NaN and None are null."""
     pa, _ = arrow()
     arrays = {}
     for name, column in chunk.columns.items():
@@ -62,7 +62,7 @@ def as_arrow(chunk: Chunk) -> pa.Table:
 
 
 def metadata_of(file: Path) -> dict[str, Any]:
-    """What a table says of itself. Raises InputError where it isn't a sweep's."""
+    """A table's metadata. Raises InputError if it isn't the table of a sweep."""
     pa, pq = arrow()
     try:
         metadata: dict[str, Any] = json.loads((pq.read_metadata(file).metadata or {})[KEY])
@@ -74,11 +74,11 @@ def metadata_of(file: Path) -> dict[str, Any]:
 def run_study(
     study: Study, file: Path, *, dask: str = "", resume: bool = False, progress: bool = True
 ) -> dict[str, Any]:
-    """Fly all rows and write the table, which has its name when it is whole; returns its metadata. dask: address of a
-    scheduler whose workers fly them. resume: behind the rows that the table has already.
+    """Fly all rows and write the table, which gets its final name when it is complete. Returns its metadata. dask:
+    address of a scheduler whose workers fly the rows. resume: continue after the rows that the table already has.
 
-    Raises SweepInterrupted on Ctrl-C, with a readable table of the rows before; InputError for a table to resume that
-    is of another study.
+    Raises SweepInterrupted on Ctrl-C and leaves a readable table of the rows so far. Raises InputError if the table to
+    resume belongs to another study.
     """
     pa, pq = arrow()
     before = metadata_of(file) if resume and file.is_file() else {}
@@ -132,7 +132,7 @@ def run_study(
 
 
 def chunks(study: Study, first: int, workers: Workers) -> Iterator[Chunk]:
-    """The chunks of rows from ``first`` on, in their order; two for each worker are under way."""
+    """The chunks of rows from ``first`` on, in order. Two chunks per worker are in flight at a time."""
     commands = len(expand_script(study.script, "script"))
     most = min(CHUNK_ROWS, CHUNK_COMMANDS // max(1, commands))
     step = max(1, min(most, -(-(study.rows - first) // (2 * workers.count))))

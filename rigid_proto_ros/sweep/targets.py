@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""What a study varies: a parameter, one component of it, or a field of an entry of the poke script.
+"""Targets: what a study can vary. A target is a parameter, a component of one, or a field of a poke script entry.
 
 ``mass``, ``initial.angular_velocity.x``, ``explicit_inertia.tensor.izz``, ``ballast.tip.mass``; ``script.1.force.z``,
 ``script.2.at.vertex``, ``script.1.wrench.duration``.
@@ -23,8 +23,8 @@ _SCRIPT_FIELDS = sorted(ENTRY_KEYS)
 
 @dataclass(frozen=True)
 class Target:
-    """name: as the study writes it. parameter: and ``path`` a component (k,) or (). Otherwise ``entry`` counts from 1
-    in the script, and ``path`` leads to the field.
+    """name: as the study writes it. For a parameter, ``parameter`` is its name and ``path`` its component (k,) or ().
+    For the script, ``entry`` is the entry's number, from 1, and ``path`` the keys of the field.
     """
 
     name: str
@@ -33,7 +33,7 @@ class Target:
     path: tuple[Any, ...] = ()
 
     def put(self, values: MutableMapping[str, Value], entries: list[Any], value: Any) -> None:
-        """Set the varied value in parameters (complete ones) or in the script's entries."""
+        """Set the varied value in the parameters (a complete set) or in the script's entries."""
         if self.parameter:
             whole = _with_component(values[self.parameter], self.path[0], value) if self.path else value
             values[self.parameter] = parameter_named(self.parameter).convert(whole)
@@ -47,22 +47,22 @@ class Target:
                 place[key] = [0.0, 0.0, 0.0] if isinstance(following, int) else {}
             place = place[key]
         if self.is_vertex and isinstance(value, float) and value.is_integer():
-            value = int(value)  # numbers of a grid come as doubles
+            value = int(value)  # grids hold doubles
         place[self.path[-1]] = copy.deepcopy(value)
 
     @property
     def is_vertex(self) -> bool:
-        """Whether it is the number of a vertex."""
+        """Whether it is a vertex index."""
         return bool(self.entry) and self.path[-1] == "vertex"
 
     def component_names(self, count: int) -> list[str]:
-        """Names of ``count`` columns for a vector value; forces of thrusters have numbers."""
+        """Names of the ``count`` columns of a vector value; thruster forces are numbered."""
         labels = map(str, range(count)) if self.path == ("thrusters",) else component_labels(self.parameter, count)
         return [f"{self.name}.{label}" for label in labels]
 
 
 def component_labels(parameter: str, count: int) -> list[str]:
-    """What the components of a vector are called."""
+    """Names of a vector's components."""
     if parameter.startswith("ballast.") and count == 4:
         return _BALLAST.split()
     return _COMPONENTS[count].split() if count in _COMPONENTS else [str(k) for k in range(count)]
@@ -76,8 +76,8 @@ def _with_component(vector: Value, k: int, value: Any) -> list[Any]:
 
 
 def read_target(name: str, field: str, values: Mapping[str, Value], entries: list[Any]) -> Target:
-    """The target of a name, given the scene's values and the script's entries; raises InputError with the
-    nearest name.
+    """The target of a name. values: the scene's. entries: the script's. Raises InputError, which suggests the nearest
+    name.
     """
     if name.split(".")[0] == "script":
         return _script_target(name, field, entries)
@@ -122,7 +122,7 @@ def _script_target(name: str, field: str, entries: list[Any]) -> Target:
     if keys[0] not in _SCRIPT_FIELDS:
         raise InputError(field, keys[0], one_of(keys[0], _SCRIPT_FIELDS))
     if keys[0] == "set":
-        # A parameter's name has dots of its own.
+        # The name of a parameter contains dots.
         keys = ["set", ".".join(keys[1:])]
         try:
             parameter_named(keys[1])

@@ -1,10 +1,10 @@
 # SPDX-License-Identifier: MIT
-"""Who flies the rows of a study: threads of this process around the compiled batch, which leaves the interpreter's lock
-alone, or the workers of a Dask cluster. Rows are a function of the study and their numbers alone, so it doesn't matter
-who flies them, or how often.
+"""Workers that fly a study's rows: threads of this process, since the compiled batch releases the interpreter's lock,
+or the workers of a Dask cluster. A row depends only on the study and its number, so it doesn't matter which worker
+flies it, or how often.
 
-Dask's scheduler deals the chunks out and gives those of a lost worker to another one. Its workers need this package
-with the same kernels; the meshes' content goes with the study.
+Dask's scheduler distributes the chunks and gives those of a lost worker to another one. Its workers need this package
+with the same kernels. The contents of the meshes are sent with the study.
 """
 
 from __future__ import annotations
@@ -23,54 +23,54 @@ from .rows import Chunk, run_chunk
 from .study import Study
 
 CONNECT_S = 10.0
-"""[s] A scheduler that is there answers in this time."""
+"""Timeout of the connection to a scheduler [s]."""
 
 
 class Flown(Protocol):
-    """A chunk under way."""
+    """A chunk in flight."""
 
     def result(self) -> Chunk:
-        """The chunk, once it is done; raises what flying it has raised."""
+        """Wait for the chunk and return it. Raises what flying it raised."""
 
 
 class Workers(Protocol):
-    """Whoever flies chunks."""
+    """A pool of workers."""
 
     @property
     def count(self) -> int:
-        """How many chunks are flown at a time."""
+        """Number of chunks flown at a time."""
 
     def submit(self, first: int, last: int) -> Flown:
-        """Begin the chunk of rows first to last − 1."""
+        """Start flying rows first to last − 1."""
 
     def close(self) -> None:
-        """Give up what isn't done."""
+        """Cancel what isn't done."""
 
 
 def cores() -> int:
-    """Processor cores that this process may use."""
+    """Number of processor cores that this process may use."""
     return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
 
 
 class Threads:
-    """One thread a core."""
+    """Threads of this process, one per core."""
 
     def __init__(self, study: Study) -> None:
         self.count = cores()
         self._study, self._pool = study, ThreadPoolExecutor(self.count)
 
     def submit(self, first: int, last: int) -> Flown:
-        """Begin the chunk of rows first to last − 1."""
+        """Start flying rows first to last − 1."""
         return self._pool.submit(run_chunk, self._study, first, last)
 
     def close(self) -> None:
-        """Give up what isn't done."""
+        """Cancel chunks that haven't started, and wait for the others."""
         self._pool.shutdown(wait=True, cancel_futures=True)
 
 
 class Cluster:
-    """The workers of the Dask scheduler at an address, such as tcp://host:8786. Raises InputError where none answers,
-    or for a study that reads a mesh file in flight.
+    """The workers of the Dask scheduler at an address such as tcp://host:8786. Raises InputError if none answers, or
+    for a study that reads a mesh file in flight.
     """
 
     def __init__(self, study: Study, address: str) -> None:
@@ -83,25 +83,25 @@ class Cluster:
             if mesh and mesh not in body_names():
                 raise InputError("--dask", f"a script that sets mesh to {mesh!r}", "one that sets bundled bodies only")
         try:
-            client: Any = distributed.Client  # it has no types
+            client: Any = distributed.Client  # distributed has no type hints
             self._client = client(address, timeout=CONNECT_S, set_as_default=False)
         except (OSError, ValueError) as error:
             raise InputError("--dask", address, f"the address of a scheduler, tcp://host:8786 ({error})") from None
         self._address = address
-        # A task, which any worker can do again, and not scattered data, which are lost with the worker that has them.
+        # A task, which any worker can compute again; scattered data are lost with their worker.
         self._study = self._client.submit(_same, replace(study, meshes=type(study.meshes)(study.contents)), pure=False)
 
     @property
     def count(self) -> int:
-        """How many chunks are flown at a time, as many as its workers have threads."""
+        """Number of chunks flown at a time: the number of threads of all workers."""
         return max(1, int(sum(self._client.nthreads().values())))
 
     def submit(self, first: int, last: int) -> Flown:
-        """Begin the chunk of rows first to last − 1."""
+        """Start flying rows first to last − 1."""
         return _Awaited(self._client.submit(_chunk, self._study, first, last, stamp(), pure=False), self._address)
 
     def close(self) -> None:
-        """Give up what isn't done."""
+        """Disconnect; chunks that aren't done are cancelled."""
         self._client.close()
 
 
@@ -123,12 +123,12 @@ class _Awaited:
 
 
 def _same(study: Study) -> Study:
-    """What the scheduler keeps of the study."""
+    """The study, to be kept by the scheduler."""
     return study
 
 
 def _chunk(study: Study, first: int, last: int, kernels: str) -> Chunk:
-    """What a worker of the cluster does; raises InputError where its bits would be others."""
+    """Fly a chunk on a worker of the cluster. Raises InputError if its kernels differ, since its bits might."""
     if stamp() != kernels:
         raise InputError("--dask", f"a worker with kernels {stamp()}", f"workers with {kernels}, as here")
     return run_chunk(study, first, last)
