@@ -35,7 +35,7 @@ def test_it_has_the_bits_of_c_for_numbers_of_all_kinds() -> None:
     assert wrong(60_000) == []
 
 
-@pytest.mark.slow
+@pytest.mark.stress  # it builds a library first
 @pytest.mark.skipif(not library.target().startswith("x86"), reason="another processor")
 def test_a_processor_without_the_operation_flies_to_the_same_bits_by_a_library_of_its_own() -> None:
     built("x86-64-v2")

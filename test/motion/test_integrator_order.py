@@ -52,7 +52,9 @@ def test_order_under_loads(name):
         check(name, scene)
 
 
-@pytest.mark.parametrize("degree", [4, 6, 8])
+@pytest.mark.parametrize(
+    "degree", [4, pytest.param(6, marks=pytest.mark.stress), pytest.param(8, marks=pytest.mark.stress)]
+)
 def test_order_of_taylor_series_is_their_degree(degree):
     scene = scene_for(INTEGRATORS["taylor"])
     reference, simulation = scene.reference(1.0), scene.simulation(integrator="taylor")
