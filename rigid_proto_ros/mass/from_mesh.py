@@ -68,8 +68,8 @@ class MeshBody:
         """Volume [m³] of the solid, of parts the sum of theirs; raises MeshError where there is none."""
         solid = self.moments.moments("solid")
         own = math.fsum(part.volume for part in self.parts) if self.parts else solid.measure
-        x, y, z = map(abs, scale_vector(scale).tolist())
-        return own * (x * y * z)
+        x, y, z = scale_vector(scale).tolist()
+        return float(own * abs(x * y * z))
 
 
 def mesh_body(mesh: Mesh | str, *, repair: bool = False, fallback: str = "", accept_open: float = 0.0) -> MeshBody:
