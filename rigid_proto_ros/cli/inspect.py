@@ -114,7 +114,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 def run(args: argparse.Namespace) -> int:
     """Inspect, print and return the exit status. Raises InputError for refused input."""
     texts = args.mesh
-    args.mesh = _one(args) if args.lump or args.compare else None
+    args.mesh = _single_mesh(args) if args.lump or args.compare else None
     if args.lump is not None:
         return lump(args)
     if args.compare is not None:
@@ -138,7 +138,7 @@ def run(args: argparse.Namespace) -> int:
     return status
 
 
-def _one(args: argparse.Namespace) -> str | None:
+def _single_mesh(args: argparse.Namespace) -> str | None:
     """The mesh given beside a robot, if any. Raises InputError for more than one."""
     if len(args.mesh) > 1:
         option = "lump" if args.lump else "compare"

@@ -70,7 +70,7 @@ def compare(args: argparse.Namespace) -> int:
     --strict also 1 if a link is unknown.
     """
     _check_options(args)
-    _tell_what_is_left_out()
+    _report_missing_hulls()
     if args.fix is not None:
         return _fix(args)
     if len(args.compare) == 1:
@@ -112,7 +112,7 @@ def _check_options(args: argparse.Namespace) -> None:
         raise InputError("--compare", " ".join(args.compare), "one robot, with MESH or --fix")
 
 
-def _tell_what_is_left_out() -> None:
+def _report_missing_hulls() -> None:
     if missing := hull_is_missing():
         left_out = "nobody looks along the normals of a shape's hull, nor for a hull as the cause"
         print(f"rigid_proto inspect: {missing}; until then {left_out}", file=sys.stderr)

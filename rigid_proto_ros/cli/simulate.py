@@ -65,10 +65,10 @@ def add_arguments(parser: Parser) -> None:
     )
     parser.add_argument("--json", action="store_true", help="print one JSON object")
     add_exports(parser)
-    parser.instead_of = _instead_of
+    parser.instead_of = _hint_for
 
 
-def _instead_of(option: str) -> str:
+def _hint_for(option: str) -> str:
     """Hint for a parameter that was given as an option."""
     from ..parameters.declarations import PARAMETERS
 
@@ -86,7 +86,7 @@ def run(args: argparse.Namespace) -> int:
     from ..simulation.commands import nanoseconds
     from ..simulation.observer import Observers
 
-    settings = dict(map(_setting, args.set))
+    settings = dict(map(_parse_setting, args.set))
     scenario = read_scene(args.scene, settings, _warn)
     for warning in scenario.warnings:
         _warn(warning)
@@ -95,7 +95,7 @@ def run(args: argparse.Namespace) -> int:
     duration_ns = max(DURATION_NS, last_ns + AFTER_SCRIPT_NS) if args.duration is None else nanoseconds(args.duration)
     if beyond := sum(command.stamp_ns >= duration_ns for command in script):
         _warn(f"{beyond} of the script's {len(script)} commands act at or after the end, {duration_ns / 1e9:.9g} s")
-    files = _recorded(scenario, args, "record" in settings)
+    files = _recordings(scenario, args, "record" in settings)
     _check(scenario, script, args, files)
     record: FlightRecord | None = None
     if asked(args):
@@ -148,7 +148,7 @@ def _check(scenario: Scenario, script: list[Command], args: argparse.Namespace, 
         finer(scenario)
 
 
-def _moved(attitude: float | None, position: float, wall_time: float, **finer: float) -> str:
+def _sensitivity_line(attitude: float | None, position: float, wall_time: float, **finer: float) -> str:
     """One line on the sensitivity of the final state."""
     (name, value), *_ = ((name, value) for name, value in finer.items() if name in ("accuracy", "step"))
     with_it = f"with {name} {value:g} ({wall_time:.3g} s of wall time)"
@@ -157,7 +157,7 @@ def _moved(attitude: float | None, position: float, wall_time: float, **finer: f
     return f" {attitude:.3g} rad and {position:.3g} m {with_it}"
 
 
-def _setting(text: str) -> tuple[str, object]:
+def _parse_setting(text: str) -> tuple[str, object]:
     """Parse ``name=value``, with the value typed as on a ROS command line."""
     from ..base.yaml_text import scalar
 
@@ -167,7 +167,7 @@ def _setting(text: str) -> tuple[str, object]:
     return name.strip(), scalar(value.strip())
 
 
-def _recorded(scenario: Scenario, args: argparse.Namespace, set_by_option: bool) -> list[str]:
+def _recordings(scenario: Scenario, args: argparse.Namespace, set_by_option: bool) -> list[str]:
     """The files to record to, checked to be writable. Raises InputError."""
     from ..rerun_view.recorders import recording_names
     from ..scene.scene_file import check_record
@@ -205,7 +205,7 @@ def _print_summary(result: dict[str, Any], recordings: list[str]) -> None:
     if any(result["rotor_momentum"]):
         rows["flywheel (body)"] = vector("rotor_momentum", "N m s")
     if "sensitivity" in result:
-        rows["sensitivity"] = _moved(**result["sensitivity"])
+        rows["sensitivity"] = _sensitivity_line(**result["sensitivity"])
     for name, value in rows.items():
         print(f"{name:16s} {value}")
     for file in recordings:

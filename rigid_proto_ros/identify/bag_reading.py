@@ -128,7 +128,7 @@ def _chosen(types: dict[str, str], given: dict[str, str], path: str) -> dict[str
     return found
 
 
-def _pair(one: Any, other: Any) -> tuple[float, ...]:
+def _components(one: Any, other: Any) -> tuple[float, ...]:
     """Components of two vectors, or of a position and an orientation xyzw."""
     numbers = (one.x, one.y, one.z, other.x, other.y, other.z)
     return (*numbers, other.w) if hasattr(other, "w") else numbers
@@ -138,21 +138,21 @@ def _imu(m: Any) -> tuple[float, ...]:
     """Angular velocity and acceleration; NaN for one whose covariance begins with -1, which isn't measured
     (sensor_msgs/msg/Imu).
     """
-    numbers = _pair(m.angular_velocity, m.linear_acceleration)
+    numbers = _components(m.angular_velocity, m.linear_acceleration)
     has_rate, has_felt = m.angular_velocity_covariance[0] != -1.0, m.linear_acceleration_covariance[0] != -1.0
     none = (np.nan, np.nan, np.nan)
     return (numbers[:3] if has_rate else none) + (numbers[3:] if has_felt else none)
 
 
 _READ: dict[str, tuple[str, Callable[[Any], tuple[float, ...]]]] = {
-    "geometry_msgs/msg/PoseStamped": ("pose", lambda m: _pair(m.pose.position, m.pose.orientation)),
+    "geometry_msgs/msg/PoseStamped": ("pose", lambda m: _components(m.pose.position, m.pose.orientation)),
     "geometry_msgs/msg/PoseWithCovarianceStamped": (
         "pose",
-        lambda m: _pair(m.pose.pose.position, m.pose.pose.orientation),
+        lambda m: _components(m.pose.pose.position, m.pose.pose.orientation),
     ),
-    "nav_msgs/msg/Odometry": ("pose", lambda m: _pair(m.pose.pose.position, m.pose.pose.orientation)),
-    **dict.fromkeys(TRANSFORMS, ("pose", lambda m: _pair(m.transform.translation, m.transform.rotation))),
-    "geometry_msgs/msg/WrenchStamped": ("wrench", lambda m: _pair(m.wrench.force, m.wrench.torque)),
+    "nav_msgs/msg/Odometry": ("pose", lambda m: _components(m.pose.pose.position, m.pose.pose.orientation)),
+    **dict.fromkeys(TRANSFORMS, ("pose", lambda m: _components(m.transform.translation, m.transform.rotation))),
+    "geometry_msgs/msg/WrenchStamped": ("wrench", lambda m: _components(m.wrench.force, m.wrench.torque)),
     "sensor_msgs/msg/Imu": ("imu", _imu),
 }
 """By message type: the option that takes it, and the function that extracts its numbers."""
@@ -246,7 +246,7 @@ def wrench_history(
     """
     acts: BoolArray = np.any(numbers != 0.0, axis=1)
     same = np.append(False, np.all(numbers[1:] == numbers[:-1], axis=1))
-    begins, sds_s = _begins(times, acts)
+    begins, sds_s = _begin_times(times, acts)
     ends = np.minimum(np.append(begins[1:], times[-1] + WRENCH_TIMEOUT_NS), times + WRENCH_TIMEOUT_NS)
     rows: list[tuple[int, int, FloatArray]] = []
     before, which = np.full(len(times), -1), np.full(len(times), -1)
@@ -277,7 +277,7 @@ def _sharpness(numbers: FloatArray) -> FloatArray:
     return np.where((sizes > 0.0) & (sharp > LEAST_JUMP), np.minimum(sharp / np.maximum(sizes, 1e-300), 1.0), 0.0)
 
 
-def _begins(times_ns: IntArray, acts: BoolArray) -> tuple[IntArray, FloatArray]:
+def _begin_times(times_ns: IntArray, acts: BoolArray) -> tuple[IntArray, FloatArray]:
     """Times (m,) [ns] at which the loads of messages at times_ns (m,) begin, and their standard deviations (m,) [s].
 
     A command acts from its stamp on. A wrench that is sent at a steady rate, even while it is zero, is a sampled load:

@@ -81,17 +81,17 @@ class Identification:
     @property
     def inertia(self) -> list[Quantity]:
         """ixx ixy ixz iyy iyz izz [kg m², about the COM, axes of the tracked frame]."""
-        return self._whole(lambda values: six_from_tensor(values.inertia))
+        return self._all_or_none(lambda values: six_from_tensor(values.inertia))
 
     @property
     def shape(self) -> list[Quantity]:
         """The entries of the tensor divided by its trace."""
-        return self._whole(lambda values: six_from_tensor(values.inertia / np.trace(values.inertia)))
+        return self._all_or_none(lambda values: six_from_tensor(values.inertia / np.trace(values.inertia)))
 
     @property
     def moments(self) -> list[Quantity]:
         """Principal moments, ascending [kg m²]."""
-        return self._whole(lambda values: principal_axes(values.inertia)[0])
+        return self._all_or_none(lambda values: principal_axes(values.inertia)[0])
 
     @property
     def others(self) -> dict[str, Quantity]:
@@ -122,7 +122,7 @@ class Identification:
         found = self.identifiability.quantities(read)
         return [Quantity(None, None)] * len(found) if group in self.guessed else found
 
-    def _whole(self, read: Callable[[Values], Numbers]) -> list[Quantity]:
+    def _all_or_none(self, read: Callable[[Values], Numbers]) -> list[Quantity]:
         """All quantities, or none if one isn't identified: an entry that happens to be 0 has the scale of the
         others.
         """

@@ -220,11 +220,11 @@ def _from_path(poses: Sequence[_Poses], unknowns: Unknowns, values: Values) -> V
         moved = -_integral(one.seconds, one.positions + turns @ values.center_of_mass - one.positions[0])
         pushed = one.impulses.path(one.seconds) + (0.0 if is_damped else drag) * moved
         columns = [turns, -pushed[:, :, None], -moved[:, :, None], right[:, :, None]]
-        rows.append(_without(np.hstack([np.ones_like(t), t]), np.concatenate(columns, axis=2)))
+        rows.append(_project_out(np.hstack([np.ones_like(t), t]), np.concatenate(columns, axis=2)))
     is_pushed = any(drag > 0.0 for drag in drags) or any(len(one.impulses.seconds) for one in poses)
     free = np.array(["com" in unknowns] * 3 + ["mass" in unknowns and is_pushed, is_damped])
     known = np.array([*values.center_of_mass, 1.0 / values.mass, 0.0])
-    found, sds = _solved(np.concatenate(rows), free, known, np.array([LOOSE * values.size] * 3 + [np.inf] * 2))
+    found, sds = _least_squares(np.concatenate(rows), free, known, np.array([LOOSE * values.size] * 3 + [np.inf] * 2))
     mass = 1.0 / _inverse(found[3], sds[3], values.mass) if free[3] else values.mass
     inertia = values.inertia * (mass / values.mass)
     damping = np.array([max(float(found[4]) * mass, 0.0) if is_damped else values.damping[0], values.damping[1]])
@@ -248,12 +248,12 @@ def _from_turns(poses: Sequence[_Poses], unknowns: Unknowns, values: Values) -> 
         slowed = -_integral(seconds, turned)
         pushed = pushed + (0.0 if is_damped else drag) * slowed
         columns = [shape, -pushed[:, :, None], -slowed[:, :, None], -turned[:, :, None] / 3.0]
-        rows.append(_without(np.ones((len(seconds), 1)), np.concatenate(columns, axis=2)))
+        rows.append(_project_out(np.ones((len(seconds), 1)), np.concatenate(columns, axis=2)))
     is_pushed = any(drag > 0.0 for drag in drags) or any(len(one.impulses.seconds) for one in poses)
     trace = float(np.trace(values.inertia))
     before = [np.sum(basis * values.inertia) / trace / np.sum(basis * basis) for basis in _SHAPES]
     free, known = np.array([True] * 5 + [is_pushed, is_damped]), np.array([*before, 1.0 / trace, 0.0])
-    found, sds = _solved(np.concatenate(rows), free, known, np.array([LOOSE] * 5 + [np.inf] * 2))
+    found, sds = _least_squares(np.concatenate(rows), free, known, np.array([LOOSE] * 5 + [np.inf] * 2))
     tensor = possible_tensor(np.eye(3) / 3.0 + np.tensordot(found[:5], _SHAPES, 1), THIN)
     if is_pushed:
         trace = 1.0 / _inverse(found[5], sds[5], trace)
@@ -283,14 +283,16 @@ def _rates(poses: _Poses) -> tuple[FloatArray, FloatArray, FloatArray, Points]:
     return begin[kept], end[kept], middle[kept], (turn / (end - begin)[:, None])[kept]
 
 
-def _without(basis: FloatArray, columns: FloatArray) -> FloatArray:
+def _project_out(basis: FloatArray, columns: FloatArray) -> FloatArray:
     """Rows (3 n, k) of columns (n, 3, k) minus their projection onto ``basis`` (n, b), for each axis."""
     Q, _ = np.linalg.qr(basis)
     rest = columns - np.tensordot(Q, np.tensordot(Q.T, columns, 1), 1)
     return rest.reshape(-1, columns.shape[2])
 
 
-def _solved(rows: FloatArray, free: BoolArray, known: FloatArray, widths: FloatArray) -> tuple[FloatArray, FloatArray]:
+def _least_squares(
+    rows: FloatArray, free: BoolArray, known: FloatArray, widths: FloatArray
+) -> tuple[FloatArray, FloatArray]:
     """Least-squares solution (k,) of rows (n, k + 1), whose last column is the right side, and standard deviations
     (k,). Only numbers that are ``free`` change from ``known``. widths: standard deviations of the prior of the free
     ones, which has the weight of one sample.

@@ -89,7 +89,7 @@ def _load_history(
         if not isinstance(command, WrenchCommand):
             reason = f"at {1e-9 * time_ns:g} s {name} has a {kind} event"
             raise InputError("session", f"{reason}: only wrenches and pokes are supported; end before it with --to")
-        load = _tracked(command, setup, name, time_ns)
+        load = _load_row(command, setup, name, time_ns)
         if command.frame.impulse:
             impulses.append((time_ns, time_ns, load))
             continue
@@ -104,7 +104,7 @@ def _load_history(
     return load_history(impulses + pushes)
 
 
-def _tracked(command: WrenchCommand, setup: Setup, name: str, time_ns: int) -> FloatArray:
+def _load_row(command: WrenchCommand, setup: Setup, name: str, time_ns: int) -> FloatArray:
     """The load (LOAD,) with its point in the tracked frame."""
     if command.frame.point[0] == "ray":
         where = f"at {1e-9 * time_ns:g} s {name} has a poke along a ray"

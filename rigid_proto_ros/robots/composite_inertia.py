@@ -45,7 +45,7 @@ def lump_robot(path: Path, folders: tuple[Path, ...] = ()) -> Lump:
     """
     robot = read_robot(path)
     search = Search(path.parent, folders)
-    links = robot.simulated() if robot.simulated else [_computed(link, Meshes(search)) for link in robot.links]
+    links = robot.simulated() if robot.simulated else [_with_inertial(link, Meshes(search)) for link in robot.links]
     poses = robot.poses()
     for name, pose in poses.items():
         check_finite(f"link {name}", position=pose.position, orientation=pose.rotation)
@@ -68,7 +68,7 @@ def lump_robot(path: Path, folders: tuple[Path, ...] = ()) -> Lump:
             raise InputError(f"mass of link {link.name}", link.mass, "masses >= 0")
     properties = combined([placed(link, pose) for link, pose in heavy], path.name)
     check_tensor(properties.inertia, source=f"tensor of {path.name} as one body")
-    vertices, triangles, absent = _merged([(link, poses[link.name]) for link in links], search)
+    vertices, triangles, absent = _merge([(link, poses[link.name]) for link in links], search)
     masses = tuple((link.name, link.mass) for link, _ in heavy)
     massless = tuple(link.name for link in links if link.problem)
     files = [path]
@@ -78,7 +78,7 @@ def lump_robot(path: Path, folders: tuple[Path, ...] = ()) -> Lump:
     return Lump(properties, vertices, triangles, masses, massless, absent, tuple(files))
 
 
-def _computed(link: Link, meshes: Meshes) -> Link:
+def _with_inertial(link: Link, meshes: Meshes) -> Link:
     """The link with the inertial that an SDF leaves to the simulator: that of its collision shapes at their densities,
     scaled to the mass if one is given. Raises InputError for shapes that enclose no volume.
     """
@@ -92,7 +92,7 @@ def _computed(link: Link, meshes: Meshes) -> Link:
     return replace(link, mass=whole.mass, center_of_mass=whole.center_of_mass, inertia=whole.inertia, problem="")
 
 
-def _merged(links: list[tuple[Link, Pose]], search: Search) -> tuple[Points, Triangles, tuple[str, ...]]:
+def _merge(links: list[tuple[Link, Pose]], search: Search) -> tuple[Points, Triangles, tuple[str, ...]]:
     """Vertices and triangles of the visual shapes, or of the collision shapes of links without visual ones; and what is
     missing.
     """

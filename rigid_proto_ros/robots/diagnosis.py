@@ -130,7 +130,7 @@ def beyond_shapes(link: Link, points: Points) -> str:
     outside = np.maximum(-below, -above)  # distance of the COM from the hull's extent [m]
     if outside.max() > 0.0:
         axis = axes[outside.argmax()]
-        return f"COM {outside.max() + MARGIN * diagonal:.3g} m outside the hull of its shapes along {_words(axis)}"
+        return f"COM {outside.max() + MARGIN * diagonal:.3g} m outside the hull of its shapes along {_text(axis)}"
     own = np.einsum("ki,ij,kj->k", axes, variance, axes) * rounding - np.einsum(
         "ki,ij,kj->k", np.abs(axes), step, np.abs(axes)
     )
@@ -140,7 +140,7 @@ def beyond_shapes(link: Link, points: Points) -> str:
     if own[worst] <= most[worst]:
         return ""
     return (
-        f"too wide for its shapes: along {_words(axes[worst])} the mass lies {math.sqrt(own[worst]):.3g} m (r.m.s.) "
+        f"too wide for its shapes: along {_text(axes[worst])} the mass lies {math.sqrt(own[worst]):.3g} m (r.m.s.) "
         f"from the COM, and inside the shapes at most {math.sqrt(most[worst]):.3g} m"
     )
 
@@ -169,7 +169,7 @@ def _hull(points: Points) -> tuple[Points, Points]:
     return corners, normals / np.linalg.norm(normals, axis=1)[:, None]
 
 
-def _words(axis: Vector3) -> str:
+def _text(axis: Vector3) -> str:
     return f"({', '.join(f'{value + 0.0:.2g}' for value in np.round(axis, 3))})"
 
 
@@ -185,7 +185,7 @@ def _tensor_error(link: Link, truth: MassProperties) -> tuple[float, float, floa
     return float(np.max(np.abs(link.inertia - truth.inertia))) / size, float(np.max(left)) / size, ratio
 
 
-def _compared(link: Link, parts: LinkShapes, tolerance: float, role: str) -> LinkDiagnosis:
+def _compare(link: Link, parts: LinkShapes, tolerance: float, role: str) -> LinkDiagnosis:
     """Compare the link's inertial with that of its shapes of one role as a uniform solid."""
     plain = LinkDiagnosis(link.name, parts.names, UNKNOWN, link.mass, note=link.problem, judged_by=role)
     if not 0.0 < link.mass < math.inf:  # NaN for a link without an inertial
@@ -253,24 +253,24 @@ def diagnose(link: Link, meshes: Meshes, tolerance: float = LIMIT) -> LinkDiagno
         note = "; ".join(filter(None, [link.problem, note])) if missing else link.problem or note
         name = shapes[missing][0].file or shapes[missing][0].kind if missing else ""
         bare = LinkDiagnosis(link.name, name, UNKNOWN, link.mass, note=note, judged_by=missing)
-        return _possible(link, bare, [])
-    best, verdict = _judged(link, readable, tolerance)
+        return _check_possible(link, bare, [])
+    best, verdict = _judge(link, readable, tolerance)
     by_shape_alone = verdict.status in (BEYOND_SHAPE, EXPLAINED) and best.status != EXPLAINED
     if by_shape_alone and any(parts.upright() for parts in readable.values()):
         turned = {role: parts.upright() or parts for role, parts in readable.items()}
-        if _judged(link, turned, tolerance)[1].status not in WRONG:
+        if _judge(link, turned, tolerance)[1].status not in WRONG:
             note = f"{verdict.causes[-1]}, but not if its meshes are turned upright as their files say: programs differ"
             verdict = replace(verdict, status=UNKNOWN, causes=(), note=note)
     told = _remarks(readable[VISUAL if VISUAL in readable else COLLISION])
     return replace(verdict, info=(*lost.values(), *told, *verdict.info))
 
 
-def _judged(link: Link, readable: dict[str, LinkShapes], tolerance: float) -> tuple[LinkDiagnosis, LinkDiagnosis]:
+def _judge(link: Link, readable: dict[str, LinkShapes], tolerance: float) -> tuple[LinkDiagnosis, LinkDiagnosis]:
     """The diagnosis by the shapes that decide, without and with the check whether they can have the link's inertial."""
-    found = [_compared(link, parts, tolerance, role) for role, parts in readable.items()]
-    best = min(found, key=lambda one: _weight(one, readable[one.judged_by]))
+    found = [_compare(link, parts, tolerance, role) for role, parts in readable.items()]
+    best = min(found, key=lambda one: _preference(one, readable[one.judged_by]))
     only_primitives = all(parts.are_primitives for parts in readable.values())
-    return best, _possible(link, best, [parts.points for parts in readable.values()], only_primitives)
+    return best, _check_possible(link, best, [parts.points for parts in readable.values()], only_primitives)
 
 
 def missing_inertial(link: Link, meshes: Meshes, density: float) -> MassProperties:
@@ -292,7 +292,7 @@ def _remarks(parts: LinkShapes) -> list[str]:
     return list(dict.fromkeys(told))
 
 
-def _weight(diagnosis: LinkDiagnosis, parts: LinkShapes) -> tuple[bool, ...]:
+def _preference(diagnosis: LinkDiagnosis, parts: LinkShapes) -> tuple[bool, ...]:
     """Sort key of a link's diagnoses; the smallest decides. First comes one that finds the inertial uniform; then that
     of meshes, since primitives replace meshes; then one with numbers; then that of visual shapes, which are finer than
     collision shapes.
@@ -301,7 +301,7 @@ def _weight(diagnosis: LinkDiagnosis, parts: LinkShapes) -> tuple[bool, ...]:
     return diagnosis.status != UNIFORM, parts.are_primitives, not has_numbers, diagnosis.judged_by == COLLISION
 
 
-def _possible(
+def _check_possible(
     link: Link, diagnosis: LinkDiagnosis, inside: list[Points], only_primitives: bool = False
 ) -> LinkDiagnosis:
     """The diagnosis, with the verdict changed if the link's inertial is impossible or not judged. inside: points (n, 3)
@@ -341,7 +341,7 @@ def _by_mesh(
         raise InputError("compare", f"{body.mesh.name} fits {len(different)} shapes of: {names}", "one link's shape")
     link, shape = pairs[0]
     parts = LinkShapes([(shape if scale is None else replace(shape, scale=scale), body)])
-    return _possible(link, _compared(link, parts, tolerance, shape.role), [parts.points])
+    return _check_possible(link, _compare(link, parts, tolerance, shape.role), [parts.points])
 
 
 @np.errstate(all="ignore")  # for numbers near the largest, which are judged

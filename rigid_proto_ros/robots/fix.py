@@ -69,7 +69,7 @@ def _reason_to_leave(link: Link, diagnosis: LinkDiagnosis, places: dict[int, tup
     return f"its <inertial> has a <{others[0]}>, which would be lost" if others else ""
 
 
-def _filled_in(link: Link, meshes: Meshes, density: float) -> tuple[MassProperties | None, str]:
+def _make_missing(link: Link, meshes: Meshes, density: float) -> tuple[MassProperties | None, str]:
     """The inertial for a link without one, or None and the reason."""
     if link.owner is None:
         return None, f"{link.problem}; MuJoCo computes it from its geoms"
@@ -110,7 +110,7 @@ def fix_robot(
     for link in links:
         diagnosis = diagnose(link, meshes)
         if density and link.problem == NO_INERTIAL:
-            made, reason = _filled_in(link, meshes, density)
+            made, reason = _make_missing(link, meshes, density)
             if made is not None:
                 start = owners[id(link.owner)][1]
                 blank = data[start : len(data) - len(data[start:].lstrip())]  # before the link's first element

@@ -133,7 +133,7 @@ class Meshes:
         self._search = search
         self._body = functools.cache(lambda path: mesh_body(load_mesh(path), accept_open=accept_open))
 
-    def _taken(self, shape: Shape) -> MeshBody | None:
+    def _load(self, shape: Shape) -> MeshBody | None:
         """The body of a shape's mesh; None for a primitive. Raises InputError, which says whether the mesh wasn't found
         or can't be read.
         """
@@ -154,7 +154,7 @@ class Meshes:
         taken, lost = [], []
         for shape in shapes:
             try:
-                taken.append((shape, self._taken(shape)))
+                taken.append((shape, self._load(shape)))
             except InputError as error:
                 lost.append(error)
         if lost:

@@ -91,7 +91,7 @@ def _beyond_limits(question: Question) -> InputError:
     return InputError("robot file", question.path.name, limits)
 
 
-def _limit() -> None:
+def _set_limits() -> None:
     """Set the limits of this process."""
     try:
         import resource
@@ -264,7 +264,7 @@ def main() -> None:
     """Answer the question on standard input."""
     answers = os.dup(1)
     os.dup2(2, 1)  # for anything that a library prints
-    _limit()
+    _set_limits()
     question: Question = pickle.load(sys.stdin.buffer)
     try:
         answer = answered(question)

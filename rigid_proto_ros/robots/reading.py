@@ -237,7 +237,7 @@ def robot_of(root: Element, path: Path) -> Robot:
     raise InputError("robot file", f"{path.name} begins with <{tag}>, not with {accepted}")
 
 
-def _sized(shape: Shape, link: str, file: str, scale: str, text: Callable[[str], str | None]) -> Shape:
+def _with_size(shape: Shape, link: str, file: str, scale: str, text: Callable[[str], str | None]) -> Shape:
     """A link's shape with the file and scale of its mesh, or with the size of its kind, which ``text`` gives by
     name.
     """
@@ -273,7 +273,7 @@ def _urdf_link(link: Element) -> Link:
     name, shapes = link.get("name", "?"), []
     for role, part, of in _drawn(link):
         plain = Shape(role, of.tag, _urdf_pose(part.find("origin"), f"a {role} of link {name}"))
-        shapes.append(_sized(plain, name, of.get("filename", ""), of.get("scale", "1 1 1"), of.get))
+        shapes.append(_with_size(plain, name, of.get("filename", ""), of.get("scale", "1 1 1"), of.get))
     bare = Link(name, tuple(shapes), owner=link)
     inertial = link.find("inertial")
     if inertial is None:
@@ -370,7 +370,7 @@ def _sdf_link(link: Element) -> Link:
         dense = number(f"density of {owner}", _text(part, "density", density))
         own = _sdf_pose(part, f"a {role} of {owner}")
         plain = Shape(role, of.tag, own, problem=problem, density=dense)
-        shapes.append(_sized(plain, name, _text(of, "uri", ""), _text(of, "scale", "1 1 1"), of.findtext))
+        shapes.append(_with_size(plain, name, _text(of, "uri", ""), _text(of, "scale", "1 1 1"), of.findtext))
     bare = Link(name, tuple(shapes), owner=link)
     if inertial is None:
         return bare

@@ -89,7 +89,7 @@ class Scenario:
 
     def __reduce__(self) -> tuple[Callable[..., Scenario], tuple[Parameters, Mesh | None]]:
         """Pickle parameters and mesh only: compiled functions and their addresses are valid in this process only."""
-        return _of_parameters, (self.parameters, self.body_mesh.mesh if self.body_mesh else None)
+        return _scenario_of, (self.parameters, self.body_mesh.mesh if self.body_mesh else None)
 
     def with_changes(
         self, changes: Mapping[str, object], mesh: Mesh | None = None, at_hand: Scenario | None = None
@@ -103,9 +103,9 @@ class Scenario:
         values = with_mass_of_density(check_values(changes))
         parameters = self.parameters.with_values(values)
         for one in (self, at_hand):
-            if mesh is None and one is not None and _made_of(one.parameters) == _made_of(parameters):
+            if mesh is None and one is not None and _mesh_parameters(one.parameters) == _mesh_parameters(parameters):
                 return build_scenario(parameters, one.body_mesh, (self.setup, values))
-        return _of_parameters(parameters, mesh)
+        return _scenario_of(parameters, mesh)
 
     @property
     def text(self) -> str:
@@ -157,10 +157,10 @@ def make_scenario(values: Mapping[str, object], mesh: Mesh | None = None) -> Sce
 
     mesh: a loaded mesh, used instead of the one that the parameter names.
     """
-    return _of_parameters(Parameters().replaced(values), mesh)
+    return _scenario_of(Parameters().replaced(values), mesh)
 
 
-def _of_parameters(parameters: Parameters, mesh: Mesh | None) -> Scenario:
+def _scenario_of(parameters: Parameters, mesh: Mesh | None) -> Scenario:
     return build_scenario(parameters, load_body_mesh(parameters, mesh))
 
 
@@ -190,7 +190,7 @@ def load_body_mesh(parameters: Parameters, mesh: Mesh | None = None) -> BodyMesh
     return BodyMesh(body.mesh, body.moments, surface, numbers, volume)
 
 
-def _made_of(parameters: Parameters) -> tuple[str, bool, str]:
+def _mesh_parameters(parameters: Parameters) -> tuple[str, bool, str]:
     """The parameters that determine which mesh is loaded."""
     return parameters.mesh, parameters.mesh_repair, parameters.mesh_fallback
 

@@ -52,7 +52,7 @@ class Ghost(Observer):
     def on(self, event: Event) -> None:
         """Report a command that was refused when it was due."""
         if isinstance(event, Refused):
-            self._goes_without(event.message)
+            self._report_skipped(event.message)
 
     def announce(self) -> None:
         """Notify the observer of the ghost's setup."""
@@ -74,9 +74,9 @@ class Ghost(Observer):
             # Unchecked within a list: an earlier change of the list may permit what the present setup refuses.
             self.simulation.submit(command, when_ns, listed, check=listed is None)
         except InputError as error:
-            self._goes_without(str(error))
+            self._report_skipped(str(error))
 
-    def _goes_without(self, reason: str) -> None:
+    def _report_skipped(self, reason: str) -> None:
         if self._shown and not self.refusal:
             self.refusal = f"the ghost continues without a command: {reason}"
             self._observer.on(Refused(self.simulation.time_ns, "ghost", self.refusal))
@@ -270,10 +270,10 @@ class OfflineRun(ScenarioRun):
             try:
                 self.take(command, command.stamp_ns, (0, self.submitted + 1))
             except InputError as error:
-                raise self._misplaced(command, error) from None
+                raise self._with_place(command, error) from None
             self.submitted += 1
             return
-        for command, scenario in self._all_checked(commands):
+        for command, scenario in self._checked(commands):
             self.submitted += 1
             when_ns = self.take(command, command.stamp_ns, (0, self.submitted), scenario)
             if isinstance(command, Change) and "publish_rate" in command.content:
@@ -302,16 +302,16 @@ class OfflineRun(ScenarioRun):
         self.submit(script)
         return self.advance(until_ns)
 
-    def _all_checked(self, commands: Sequence[Command]) -> list[tuple[Command, Scenario]]:
+    def _checked(self, commands: Sequence[Command]) -> list[tuple[Command, Scenario]]:
         taken: list[tuple[Command, Scenario]] = []
         try:
             for each in self.check(commands):
                 taken.append(each)
         except InputError as error:
-            raise self._misplaced(commands[len(taken)], error, len(taken)) from None
+            raise self._with_place(commands[len(taken)], error, len(taken)) from None
         return taken
 
-    def _misplaced(self, command: Command, error: InputError, taken: int = 0) -> InputError:
+    def _with_place(self, command: Command, error: InputError, taken: int = 0) -> InputError:
         """The error of a command, with its place in the script. taken: number of commands of the script before it."""
         place = f"script, command {self.submitted + taken + 1} at {command.stamp_ns / 1e9:g} s, {error.field}"
         return InputError(place, error.received, error.accepted)

@@ -55,13 +55,13 @@ class FinerRun(OfflineRun):
     """The run of a script FINER times as accurate, also after a command that sets the accuracy or the integrator."""
 
     def __init__(self, scenario: Scenario, script: Iterable[Command]) -> None:
-        self._asked = scenario
+        self._original = scenario
         super().__init__(finer(scenario), script)
 
     def setup_of(self, command: Change, at_hand: Scenario | None = None) -> Setup:
         """Apply a change to the original scene, then make the result finer."""
-        self._asked = after_change(self._asked, command, at_hand)
-        return self.replace(finer(self._asked))
+        self._original = after_change(self._original, command, at_hand)
+        return self.replace(finer(self._original))
 
 
 def sensitivity_of(simulation: Simulation, scenario: Scenario, script: Iterable[Command]) -> dict[str, Any]:

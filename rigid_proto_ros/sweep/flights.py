@@ -92,7 +92,7 @@ class Flight:
         self._run = OfflineRun(scene, observer=observer)
         self._simulation = self._run.simulation
         self._given: list[tuple[int, Sequence[Command]]] = []  # each with the time at which it was given
-        self._told: dict[str, int] = {}  # number of refused commands already reported, by reason
+        self._reported: dict[str, int] = {}  # number of refused commands already reported, by reason
 
     def __enter__(self) -> Flight:
         return self
@@ -129,8 +129,8 @@ class Flight:
         else:
             self._run.advance(until_ns)
             state = simulation.state
-        if simulation.failure or simulation.refused != self._told:
-            raise self._trouble()
+        if simulation.failure or simulation.refused != self._reported:
+            raise self._failure()
         return state
 
     def fly(
@@ -146,14 +146,14 @@ class Flight:
         self._scene = scene = scene or self._scene
         self._given = [(0, read)]
         self._run.fly(scene, read, until_ns)
-        if simulation.failure or simulation.refused != self._told:
-            raise self._trouble()
+        if simulation.failure or simulation.refused != self._reported:
+            raise self._failure()
         return simulation.state
 
-    def _trouble(self) -> InputError:
+    def _failure(self) -> InputError:
         """The error of a failed motion, or of commands that were refused when due and not yet reported."""
         simulation = self._simulation
-        before, self._told = self._told, simulation.refused.copy()
+        before, self._reported = self._reported, simulation.refused.copy()
         if simulation.failure:
             return InputError("step", simulation.failure)
         new = {reason: count - before.get(reason, 0) for reason, count in simulation.refused.items()}
@@ -231,17 +231,17 @@ def fly_all(function: Callable[[Value], Result], values: Iterable[Value], worker
     values = list(values)
     workers = workers or cores()
     context = multiprocessing.get_context("spawn")
-    with ProcessPoolExecutor(workers, mp_context=context, initializer=_depend_on_the_parent) as pool:
+    with ProcessPoolExecutor(workers, mp_context=context, initializer=_bind_to_parent) as pool:
         yield from pool.map(function, values, chunksize=max(1, min(32, len(values) // (4 * workers))))
 
 
-def _depend_on_the_parent() -> None:
+def _bind_to_parent() -> None:
     """Leave interrupts to the parent, and end if the parent is killed."""
     signal.signal(signal.SIGINT, signal.SIG_IGN)
-    threading.Thread(target=_end_with_the_parent, daemon=True).start()
+    threading.Thread(target=_exit_with_parent, daemon=True).start()
 
 
-def _end_with_the_parent() -> None:
+def _exit_with_parent() -> None:
     parent = multiprocessing.parent_process()
     if parent is not None:
         parent.join()

@@ -69,8 +69,8 @@ class BatchMaker:
         parameters = parameters.replaced(self._reference)
         self._setup = setup = build_scenario(parameters, study.meshes.of(parameters)).setup
         self._table, entries = _commands_of(typical.script, setup)
-        self._written = [_place_of(v, typical.script, entries) if v.target.entry else None for v in study.vary]
-        if any(self._written) and not setup.integrator.supports_loads:
+        self._places = [_place_of(v, typical.script, entries) if v.target.entry else None for v in study.vary]
+        if any(self._places) and not setup.integrator.supports_loads:
             raise NotBatchable
 
     def batch(self, columns: list[NDArray[Any]], count: int) -> tuple[batch.Batch, BoolArray]:
@@ -79,8 +79,8 @@ class BatchMaker:
         """
         good = np.ones(count, bool)
         rows = np.repeat(np.array([self._setup.scene], SCENE), count)
-        commands = np.repeat(self._table[None], count if any(self._written) else 1, axis=0)
-        for vary, column, place in zip(self._study.vary, columns, self._written, strict=True):
+        commands = np.repeat(self._table[None], count if any(self._places) else 1, axis=0)
+        for vary, column, place in zip(self._study.vary, columns, self._places, strict=True):
             if place is not None:
                 _write(commands, place, column, good)
             elif vary.target.parameter not in self._reference:
@@ -137,7 +137,7 @@ def _write(commands: Records, place: Place, column: FloatArray, good: BoolArray)
     row, name, where = place
     lower, upper = _BOUNDS[name]
     within = (column >= lower) & (column <= upper)
-    _keep(good, within)
+    _restrict(good, within)
     values = np.where(within, column, 0.0)
     if name == "load":
         commands[name][:, row, where] = values
@@ -146,7 +146,7 @@ def _write(commands: Records, place: Place, column: FloatArray, good: BoolArray)
         commands[name][:, row] = np.rint(values * 1e9)
 
 
-def _keep(good: BoolArray, within: BoolArray) -> None:
+def _restrict(good: BoolArray, within: BoolArray) -> None:
     """Clear ``good`` for rows with numbers (n,) or (n, k) out of bounds."""
     good &= within if within.ndim == 1 else within.all(axis=1)
 
@@ -155,7 +155,7 @@ class FailedFlight(Exception):
     """A row has no result; the message says why."""
 
 
-_NO_ROW = (InputError, TypeError, AttributeError, KeyError, IndexError)
+_ROW_ERRORS = (InputError, TypeError, AttributeError, KeyError, IndexError)
 """Exceptions for values that don't fit the scene or its script together."""
 
 
@@ -173,14 +173,14 @@ class Chunk:
 
 
 @lru_cache(maxsize=16)
-def _sides(study: Study) -> list[BatchMaker]:
+def _batch_makers(study: Study) -> list[BatchMaker]:
     """Makers of batches for the study's rows and, if it has a reference, for the references. Empty if ``Simulation``
     must fly the rows.
     """
     try:
         references = [] if study.reference is None else [BatchMaker(study, dict(study.reference))]
         return [BatchMaker(study, None), *references]
-    except (NotBatchable, *_NO_ROW):
+    except (NotBatchable, *_ROW_ERRORS):
         return []
 
 
@@ -189,7 +189,7 @@ def run_chunk(study: Study, first: int, last: int) -> Chunk:
     rows, measures = np.arange(first, last, dtype=np.int64), study.measures
     columns = study.columns(rows)
     results = batch.new_results(len(rows), len(measures.table))
-    if sides := _sides(study):
+    if sides := _batch_makers(study):
         (own, good), *beside = [side.batch(columns, len(rows)) for side in sides]
         references = beside[0][0] if beside else None
         results = batch.fly_rows(own, references, measures.sample_ns, measures.table)
@@ -200,7 +200,7 @@ def run_chunk(study: Study, first: int, last: int) -> Chunk:
         results.measured[i] = np.nan
         try:
             simulate_row(study, study.applied([column[i] for column in columns]), i, results)
-        except (FailedFlight, *_NO_ROW) as error:
+        except (FailedFlight, *_ROW_ERRORS) as error:
             failures[i] = " ".join(str(error).split())
     return Chunk(_table(study, rows, columns, results, failures), len(left))
 

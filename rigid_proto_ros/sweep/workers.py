@@ -89,7 +89,9 @@ class Cluster:
             raise InputError("--dask", address, f"the address of a scheduler, tcp://host:8786 ({error})") from None
         self._address = address
         # A task, which any worker can compute again; scattered data are lost with their worker.
-        self._study = self._client.submit(_same, replace(study, meshes=type(study.meshes)(study.contents)), pure=False)
+        self._study = self._client.submit(
+            _unchanged, replace(study, meshes=type(study.meshes)(study.contents)), pure=False
+        )
 
     @property
     def count(self) -> int:
@@ -98,14 +100,16 @@ class Cluster:
 
     def submit(self, first: int, last: int) -> Flown:
         """Start flying rows first to last − 1."""
-        return _Awaited(self._client.submit(_chunk, self._study, first, last, stamp(), pure=False), self._address)
+        return _ClusterChunk(
+            self._client.submit(_fly_chunk, self._study, first, last, stamp(), pure=False), self._address
+        )
 
     def close(self) -> None:
         """Disconnect; chunks that aren't done are cancelled."""
         self._client.close()
 
 
-class _Awaited:
+class _ClusterChunk:
     """A chunk that the cluster flies."""
 
     def __init__(self, future: Any, address: str) -> None:
@@ -122,12 +126,12 @@ class _Awaited:
         return chunk
 
 
-def _same(study: Study) -> Study:
+def _unchanged(study: Study) -> Study:
     """The study, to be kept by the scheduler."""
     return study
 
 
-def _chunk(study: Study, first: int, last: int, kernels: str) -> Chunk:
+def _fly_chunk(study: Study, first: int, last: int, kernels: str) -> Chunk:
     """Fly a chunk on a worker of the cluster. Raises InputError if its kernels differ, since its bits might."""
     if stamp() != kernels:
         raise InputError("--dask", f"a worker with kernels {stamp()}", f"workers with {kernels}, as here")
