@@ -230,7 +230,14 @@ def test_the_keyboard_aims_pokes_and_pulls(opened: Opened) -> None:
     page.wait_for_function("!page.clock.paused")
 
 
-@pytest.mark.parametrize("size", [(390, 844), (844, 390), (820, 1180), (1280, 720), (1920, 1080)])
+SIZES = [
+    (390, 844),
+    (1280, 720),
+    *(pytest.param(size, marks=pytest.mark.stress) for size in ((844, 390), (820, 1180), (1920, 1080))),
+]
+
+
+@pytest.mark.parametrize("size", SIZES)
 def test_nothing_covers_the_body_or_an_arrows_tip_and_every_control_is_in_sight(
     browser: Any, size: tuple[int, int]
 ) -> None:
