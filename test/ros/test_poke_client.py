@@ -116,7 +116,7 @@ def flies_as_offline(rig, sent: list, end_ns: int, **changes) -> int:
 @pytest.mark.parametrize("paused", [False, True])
 def test_with_reset_every_entry_moves_the_node_as_simulate_moves_it_to_the_bit(rig, script, paused):
     """By the installed program. Held wrenches with a duration outlast the timeout, 0.4 s here."""
-    rig.set(real_time_factor=4.0, wrench_timeout=0.4)
+    rig.set(real_time_factor=2.0, wrench_timeout=0.4)
     if paused:
         rig.pause(True)
     before, (flown_before,) = rig.counters(), rig.heard("twist", last=1)
