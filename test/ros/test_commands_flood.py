@@ -114,7 +114,7 @@ def held_up(rig):
         rig.node_process.process.send_signal(signal.SIGCONT)
 
 
-SENT = 3_000
+SENT = 3_500
 """By each publisher: the node's side holds some hundreds of them although it is stopped."""
 
 
